@@ -14,7 +14,6 @@ from typing import Any, Literal
 import numpy as np
 
 from mlg_troubleshoot.arrays import Array
-from mlg_troubleshoot.datafile import LONGEST_NAME, is_name
 from mlg_troubleshoot.errors import MechanismError
 
 
@@ -197,7 +196,7 @@ class Mechanism:
     Raises
     ------
     MechanismError
-        If a plane is hinged to what is not there, or a name cannot be shown.
+        If a plane is hinged to what is not there.
     """
 
     planes: tuple[Plane, ...]
@@ -209,11 +208,6 @@ class Mechanism:
 
     def __post_init__(self) -> None:
         points = {(point.name, point.plane) for point in self.points}
-        names = [point.name for point in self.points]
-        for name in (*names, *(plane.name for plane in self.planes)):
-            if not is_name(name):
-                remedy = f"Give names of 1 to {LONGEST_NAME} printable characters."
-                raise MechanismError(f"{name[:60]!r} cannot be the name of a part.", remedy)
         planes: set[str] = set()
         for plane in self.planes:
             if plane.parent is not None:

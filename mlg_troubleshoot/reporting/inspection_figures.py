@@ -310,64 +310,53 @@ def _arrow(canvas: Canvas, start: complex, end: complex) -> None:
     canvas.polyline([end, base + 4.2j * along, base - 4.2j * along], INK, width=0.5)
 
 
+# Of a lane of the gauge its name, its ends, how they are marked, and the ends of its box. [in]
+_Lane = tuple[str, tuple[float, ...], Marker, tuple[float, ...]]
+
+
+def _lanes_of(a: Assessment) -> list[_Lane]:
+    """The lanes of a gauge; none without a prediction."""
+    if a.predicted_displacement_in is None or a.over_travel_in is None or a.under_travel_in is None:
+        return []
+    worst = a.predicted_displacement_in
+    sense = 1.0 if a.over_travel_in >= -a.under_travel_in else -1.0
+    u2 = 2.0 * (a.standard_uncertainty_in or 0.0)
+    box = (sense * worst - u2, sense * worst + u2)
+    what = "As loaded (expected)" if a.as_loaded else "Worst case (bound)"
+    what = "With the extension" if a.rigid_displacement_in else what
+    lanes: list[_Lane] = [(what, (a.under_travel_in, a.over_travel_in), "diamond", box)]
+    if a.inspection.measured_displacement_in is not None:
+        measured = (a.inspection.measured_displacement_in,)
+        lanes.insert(0, ("Measured on the gear", measured, "triangle", ()))
+    if a.rigid_displacement_in:
+        lanes.append(("plain model (bound)", (sense * a.rigid_displacement_in,), "diamond", ()))
+    if a.predicted_upper_in is not None and a.predicted_upper_in > worst + 5e-5:
+        lanes.append(("unmeasured at limit", (sense * a.predicted_upper_in,), "ring", ()))
+    if a.geometry_spread_in:
+        low, high = a.geometry_spread_in
+        lanes.append(("other geometries", (sense * low, sense * high), "circle", ()))
+    return lanes
+
+
 def margin_gauge(assessment: Assessment, lengths: Lengths) -> Markup | None:
     """Draw the worst cases of both senses against the margin, with the uncertainty and what was
     measured: a lane for each.
     """
-    a = assessment
-    if a.predicted_displacement_in is None or a.over_travel_in is None or a.under_travel_in is None:
+    lanes = _lanes_of(assessment)
+    if not lanes:
         return None
-    over = a.over_travel_in
-    under = a.under_travel_in
-    worst = a.predicted_displacement_in
-    sense = 1.0 if over >= -under else -1.0
-    u2 = 2.0 * (a.standard_uncertainty_in or 0.0)
-    what = "As loaded (expected)" if a.as_loaded else "Worst case (bound)"
-    what = "With the extension" if a.rigid_displacement_in else what
-    # Of each lane its name, its ends [in] and how they are marked.
-    lanes: list[tuple[str, tuple[float, ...], Marker]] = [(what, (under, over), "diamond")]
-    if a.inspection.measured_displacement_in is not None:
-        measured = (a.inspection.measured_displacement_in,)
-        lanes.insert(0, ("Measured on the gear", measured, "triangle"))
-    if a.rigid_displacement_in:
-        lanes.append(("plain model (bound)", (sense * a.rigid_displacement_in,), "diamond"))
-    if a.predicted_upper_in is not None and a.predicted_upper_in > worst + 5e-5:
-        lanes.append(("unmeasured at limit", (sense * a.predicted_upper_in,), "ring"))
-    if a.geometry_spread_in:
-        low, high = a.geometry_spread_in
-        lanes.append(("other geometries", (sense * low, sense * high), "circle"))
-    farthest = max(a.margin_in, worst + u2, *(abs(end) for _, ends, _ in lanes for end in ends))
-    said = {
-        name: " / ".join(dict.fromkeys(lengths.bare(end, True) for end in ends))
-        for name, ends, _ in lanes
-    }
-    plot = _gauge(said, a.margin_in, 1.06 * farthest, lengths)
-    shown = lengths.unit.from_inches
-    for place, (name, ends, marker) in enumerate(lanes):
-        y = place + 0.5
-        points = [plot.at(shown(end), y) for end in ends]
-        start = points[0] if len(points) > 1 else plot.at(0.0, y)
-        plot.canvas.line(start, points[-1], width=4.0 if name == what else 1.5)
-        if name == what:
-            left, right = (plot.at(shown(sense * worst + end), y) for end in (-u2, u2))
-            plot.canvas.rectangle(left - 6j, right - left + 12j)
-        for point in points:
-            plot.canvas.marker(marker, point)
-    return plot.canvas.svg()
-
-
-def _gauge(
-    lanes: Mapping[str, str], margin_in: float, extent_in: float, lengths: Lengths
-) -> figures.Plot:
-    """The gauge with its margin, and each lane with its name and what it says."""
-    said = ", ".join(f"{name}: {value}" for name, value in lanes.items())
+    margin = (-assessment.margin_in, assessment.margin_in)
+    said = [" / ".join(dict.fromkeys(lengths.bare(end, True) for end in each[1])) for each in lanes]
+    spoken = ", ".join(f"{each[0]}: {value}" for each, value in zip(lanes, said, strict=True))
     canvas = Canvas(
         690,
         68 + 21 * len(lanes),
         "Margin gauge: plunger displacement from mid-position",
-        f"Margin ±{lengths.full(margin_in)}. {said} {lengths.unit}",
+        f"Margin ±{lengths.full(margin[1])}. {spoken} {lengths.unit}",
     )
-    extent = lengths.unit.from_inches(extent_in)
+    shown = lengths.unit.from_inches
+    drawn = [*margin, *(end for _, ends, _, box in lanes for end in (*ends, *box))]
+    extent = 1.06 * shown(max(map(abs, drawn)))
     plot = figures.Plot(
         canvas,
         figures.Axis(f"{lengths.unit}, over-travel +", -extent, extent),
@@ -378,21 +367,27 @@ def _gauge(
         bottom=32,
     )
     left, top, right, bottom = plot.area
-    ends = [plot.at(lengths.unit.from_inches(end), 0.0) for end in (-margin_in, margin_in)]
-    canvas.rectangle(ends[0], ends[1] - ends[0] + 1j * (bottom - top), PALE, colour=None)
+    low, high = (plot.at(shown(end), 0.0) for end in margin)
+    canvas.rectangle(low, high - low + 1j * (bottom - top), PALE, colour=None)
     plot.draw_axes(lanes=True)
     small: dict[str, Any] = {"size": SMALL, "colour": SOFT}
     canvas.text(left + 10j, "◀ short of mid-position", **small)
     canvas.text((left + right) / 2 + 10j, "allowed", anchor="middle", **small)
     canvas.text(right + 10j, "beyond mid-position ▶", anchor="end", **small)
     canvas.text(canvas.width + 10j, lengths.unit, anchor="end", **small)
-    for at, end in zip(ends, (-margin_in, margin_in), strict=True):
+    for at, end in zip((low, high), margin, strict=True):
         canvas.line(at - 8j, at + 1j * (bottom - top + 4), width=2.6)
-        words = lengths.bare(end, True)
-        canvas.text(at - 11j, words, bold=True, anchor="middle")
-    for place, (name, value) in enumerate(lanes.items()):
-        base = 1j * (plot.at(0.0, place + 0.5).imag + 4)
+        canvas.text(at - 11j, lengths.bare(end, True), bold=True, anchor="middle")
+    for place, (name, ends, marker, box) in enumerate(lanes):
+        zero, *points = (plot.at(shown(end), place + 0.5) for end in (0.0, *ends))
+        base = 1j * (zero.imag + 4)
         bold = name[0].isupper()
         canvas.text(base, name, bold=bold)
-        canvas.text(canvas.width + base, value, bold=bold, anchor="end")
-    return plot
+        canvas.text(canvas.width + base, said[place], bold=bold, anchor="end")
+        canvas.line(points[0] if len(points) > 1 else zero, points[-1], width=4 if box else 1.5)
+        if box:
+            start, stop = (plot.at(shown(end), place + 0.5) for end in box)
+            canvas.rectangle(start - 6j, stop - start + 12j)
+        for point in points:
+            canvas.marker(marker, point)
+    return canvas.svg()

@@ -124,10 +124,11 @@ def _inspection(
         "front_warnings": front,
         "gauge": margin_gauge(a, lengths),
         "drawing": schematic(gear, a),
-        "legend": [(joint_mark("", state), words) for state, words in JOINT_STATES.items()],
+        "joint_states": JOINT_STATES,
+        "joint_mark": joint_mark,
+        "joint_state": joint_state,
         "no_repair": no_repair_set(a),
         "areas": partial(_areas, gear),
-        "rows": _joints(gear, a),
         "cases": _sequence(gear, a, lengths),
     }
 
@@ -136,15 +137,6 @@ def _place(
     source: RowSource, absent: str | None = None
 ) -> tuple[str | None, str | None, str | None]:
     return source.file, source.sheet, absent if source.row is None else str(source.row)
-
-
-def _joints(gear: Gear, a: Assessment) -> list[dict[str, Any]]:
-    """The ranked joints, each with its mark."""
-    rows = []
-    for f in a.ranked:
-        state = joint_state(gear.joint(f.joint), f.clearance_in)
-        rows.append({"f": f, "state": state, "mark": joint_mark(str(f.joint), state)})
-    return rows
 
 
 def _areas(gear: Gear, step: Step) -> str:

@@ -105,24 +105,6 @@ def test_two_numbers_that_names_make_alike_are_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        *("", " ", "x" * 41, "a\x00b", "a\x1b[31m", "a\nb", "a\u202eb", "a\u2066b", "a\u200bb"),
-        *("\ud800", "a\ufffeb"),
-    ],
-)
-def test_a_name_that_cannot_be_shown_as_it_is_is_refused(name: str) -> None:
-    with pytest.raises(MechanismError, match="cannot be the name of a part"):
-        Mechanism(
-            (Plane("base"),),
-            (Point(name, "base", 0.0, 0.0, True),),
-            (),
-            Output("angle", name, name),
-            0.0,
-        )
-
-
-@pytest.mark.parametrize(
     "text", ["[" * 5000 + "]" * 5000, '{"a": ' * 5000 + "1" + "}" * 5000, "1" * 5000, "[]", "3"]
 )
 def test_a_json_file_that_is_too_deep_or_no_table_is_refused(tmp_path: Path, text: str) -> None:
