@@ -131,6 +131,8 @@ def log_of(life: GearLife, gear: Gear, joints: Collection[int] | None = None) ->
     day stands where it was entered. `joints`: without readings of others.
     """
     lines: list[LogLine] = []
+    newest = {entry.record: entry.row for entry in life.entries}
+    rows = {entry.record.key: newest.get(entry.newest) for entry in life.entries}
     for entry in life.entries:
         record = entry.record
         about: dict[str, Any] = {
@@ -145,6 +147,9 @@ def log_of(life: GearLife, gear: Gear, joints: Collection[int] | None = None) ->
         elif record.kind not in ENTERED:
             about["gear_landings"] = record.body.get("landings")
             found = _other_lines(record)
+            if record.kind is RecordKind.VOID and (void := rows.get(record.body["voids"])):
+                text = Sentence.of("void: {}: {}", in_words(void, gear), record.body["why"])
+                found = [LogLine("void", text, date=record.day or None)]
         lines += [replace(line, **about) for line in found]
     return _in_time(lines)
 
@@ -227,6 +232,11 @@ def visit_lines(
     return [*found, *after]
 
 
+def in_words(row: Inspection, gear: Gear) -> Sentence:
+    """The facts of a visit in one sentence."""
+    return Sentence.joined((line.text for line in shortened(visit_lines(row, gear))), ", ")
+
+
 def _plunger(row: Inspection, reading: float) -> LogLine:
     text = Sentence.of("plunger {}", _signed(reading))
     day = _day(row.plunger_date or row.inspection_date)
@@ -255,8 +265,7 @@ def _corrected(old: Inspection, row: Inspection) -> Iterator[LogLine]:
     for what in dict.fromkeys((*was, *now)):
         if was.get(what) != now.get(what):
             both = (each.get(what, "blank") for each in (was, now))
-            shown = (Length(x) if what[0] == "#" and x != "blank" else x for x in both)
-            text = Sentence.of("correction: {} {} → {}", what, *shown)
+            text = Sentence.of("correction: {} {} → {}", what, *both)
             yield LogLine("correction", text, date=day)
 
 

@@ -18,7 +18,7 @@ import sqlalchemy as sql
 from mlg_troubleshoot.decision.columns import COLUMNS, DATE, Holds
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, RowSource
 from mlg_troubleshoot.store.database import DRAFTS, Record, RecordKind, Store, packed
-from mlg_troubleshoot.units import LengthUnit
+from mlg_troubleshoot.units import Length, LengthUnit, Sentence
 
 # What says where and how an inspection was entered, not what was found.
 NOT_CONTENT = ("record_id", "source", "warnings", "entered", "unit_question")
@@ -114,8 +114,24 @@ def cells_of(said: Mapping[str, Any]) -> dict[str, Any]:
     """What an inspection says, by its words in a sentence."""
     clearance = sorted(said.get("clearance_in", {}).items(), key=lambda each: int(each[0]))
     left_out = (*NOT_CONTENT, "clearance_in")
-    others = {n.replace("_", " "): value for n, value in said.items() if n not in left_out}
-    return {f"#{joint}": value for joint, value in clearance} | others
+    others = {
+        _WORDS.get(name, name.replace("_", " ")): _in_words(name, value)
+        for name, value in said.items()
+        if name not in left_out
+    }
+    return {f"#{joint}": Length.brief(value) for joint, value in clearance} | others
+
+
+_WORDS = {column.filled: column.said for column in COLUMNS}
+
+
+def _in_words(name: str, value: Any) -> Any:
+    if isinstance(value, Mapping):
+        each = (Sentence.of("{} {}", key, _in_words(name, one)) for key, one in value.items())
+        return Sentence.joined(each, ", ")
+    if isinstance(value, list):
+        return Sentence.joined((_in_words(name, one) for one in value), ", ")
+    return Length.brief(value) if name.endswith("_in") else value
 
 
 _MOST_CHARACTERS = 1_000_000

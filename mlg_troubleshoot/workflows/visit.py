@@ -17,10 +17,9 @@ from mlg_troubleshoot.decision.columns import (
 from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.life.folding import as_spelt, lives_of
-from mlg_troubleshoot.life.logbook import shortened, visit_lines
+from mlg_troubleshoot.life.logbook import in_words
 from mlg_troubleshoot.life.state import GearKey, GearState, state_now
 from mlg_troubleshoot.store import Record, Store
-from mlg_troubleshoot.units import Sentence
 from mlg_troubleshoot.workflows.check import CheckResult
 
 # The one question that a step asks, by its column; joints to read are asked one by one.
@@ -97,6 +96,5 @@ def find_visit(
     undoes = ""
     is_own = visits[-1].kept.record_id in own
     if is_own and len(life.visits) > 1:
-        lines = shortened(visit_lines(visits[-1].inspection, gear))
-        undoes = Sentence.joined((line.text for line in lines), ", ")
+        undoes = in_words(visits[-1].inspection, gear)
     return Visit(tuple(each.kept for each in visits), row, judge(state), last, is_own, undoes)

@@ -98,7 +98,7 @@ def test_the_cells_that_were_changed_are_named(keep: Keep) -> None:
     refused = keep(A={"outcome": ""}, B={CLEARANCE: "0.0031"}, C={"outcome": "FAILED"}).err
     assert "kept already with other content: B (N1 LH 2026-02-01)" in refused
     assert "Settle the table as a whole" in " ".join(refused.split())
-    assert "B (N1 LH 2026-02-01): #3 was 0.001, the table says 0.0031" in refused
+    assert "B (N1 LH 2026-02-01): #3 was 0.001 in, the table says 0.0031 in" in refused
     assert "C (N1 LH 2026-03-01): outcome was blank, the table says FAILED" in refused
     assert "--amend takes what it says, --keep-old leaves what is kept" in " ".join(refused.split())
 
@@ -160,7 +160,7 @@ def test_the_last_digits_of_a_double_are_no_change(without_ids: Path) -> None:
 
 def test_a_changed_cell_of_a_table_without_ids_is_named_and_amended(without_ids: Path) -> None:
     changed = unnamed(without_ids, "0.0011", "0.0099", "0.0013")
-    assert "#3 was 0.0012, the table says 0.0099" in mlg("check", changed, "--keep").err
+    assert "#3 was 0.0012 in, the table says 0.0099 in" in mlg("check", changed, "--keep").err
     mlg("check", changed, "--keep", "--amend")
     assert len(mlg("fleet", "--json", "--no-forecast").json["gears"]) == 3
     assert "0 inspections kept" in mlg("check", changed, "--keep").err

@@ -129,14 +129,22 @@ def test_a_correction_counts_and_what_it_corrects_does_not(tmp_path: Path, place
     assert joint_3(life())["readings"] == [[400.0, 0.001]]
 
 
-def test_the_log_shows_what_was_corrected_and_the_fact_as_it_is_now(tmp_path: Path) -> None:
+def test_the_log_shows_what_was_corrected_and_voided_and_the_fact_as_it_is_now(
+    tmp_path: Path,
+) -> None:
     seeded((2, 0.02))
-    assert mlg("history", "amend", "N123-LH-2", "3=0.002in", "outcome=FAILED").code == 0
+    for values in (("3=0.002in", "outcome=FAILED"), ("plunger=0.046in",), ("plunger=0.012in",)):
+        assert mlg("history", "amend", "N123-LH-2", *values).code == 0
     events = life()["events"]
     said = [(each["kind"], each["text"]) for each in events if each["kind"] != "verdict"]
-    assert ("correction", "correction: #3 0.0200 in → 0.0020 in") in said
+    assert ("correction", "correction: #3 0.02 in → 0.002 in") in said
     assert ("correction", "correction: outcome blank → FAILED") in said
+    plunger = "correction: plunger displacement 0.046 in → 0.012 in"
+    assert ("correction", plunger) in said
     assert [kind for kind, _text in said if kind in ("FAILED", "reading")] == ["FAILED", "reading"]
+    assert mlg("history", "void", "N123-LH-2", "--why", "of another gear").code == 0
+    (void,) = [each["text"] for each in life()["events"] if each["kind"] == "void"]
+    assert void == "void: FAILED, plunger +0.012 in, #3 0.002in: of another gear"
 
 
 @pytest.mark.parametrize(
