@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
-from scipy.special import chdtri
 from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array, Mask, Probability, Size, Wholes, rms
@@ -132,15 +130,6 @@ class Gain:
         )
 
 
-def folds(noise: NoiseModel, columns: Array) -> tuple[Wholes, str]:
-    """Number the fold in which each row is held out, with its tail where there are enough and
-    others teach the rest.
-    """
-    group = noise.tails if noise.tails.max() + 1 >= LEAST_TAILS else None
-    rows = np.arange(len(noise.relative))
-    return folds_of(rows, group, columns, rows)
-
-
 def measure_gain(
     noise: NoiseModel,
     columns: Array,
@@ -154,14 +143,15 @@ def measure_gain(
     cannot teach it. It is fitted to the misfit of the likeliest clearances, and its gain is that of
     a check, which predicts from clearances as they were read.
     """
-    fold, held_out_by = folds(noise, columns)
+    rows = np.arange(len(misfit))
+    tails = noise.tails if noise.tails.max() + 1 >= LEAST_TAILS else None
+    fold, held_out_by = folds_of(rows, tails, columns, rows)
     expected = less_expected(misfit, predicted)
     known = None if block is None else (block.shared_in, block.covariance)
     correction = held_out_part(noise, columns, expected, fold, known)
     measured = predicted + misfit
     before = measured - as_read
     after = before - correction
-    drawn = noise.tails if noise.tails.max() + 1 >= LEAST_TAILS else np.arange(len(misfit))
     smaller = bool(rms(after) < rms(before))
     more_likely = likelier(noise, expected, expected - correction, fold)
     return Gain.of(
@@ -169,7 +159,7 @@ def measure_gain(
         measured,
         as_read,
         as_read + correction,
-        share_interval=_interval_of_gain(before, after, drawn),
+        share_interval=_interval_of_gain(before, after, rows if tails is None else tails),
         held_out_by="tail" if held_out_by == "group" else "row",
         better=smaller and more_likely,
         worse=not (smaller or more_likely),
@@ -284,10 +274,7 @@ class NamedCause(Term):
         wear.
         """
         fixed = self.candidate.setting
-        if "factors" in fixed:
-            return {f"factor_{joint}": value for joint, value in fixed["factors"].items()}
-        shown = dict(self.candidate.cause.shown(self.value))
-        return shown | {
+        return self._shown("factors", self.value) | {
             name: fixed[name]
             for name in ("since", "until", "wear_exponent")
             if fixed.get(name) is not None
@@ -296,14 +283,15 @@ class NamedCause(Term):
     @property
     def interval_shown(self) -> dict[str, tuple[float, float]]:
         """Intervals of the parameters as a person reads them."""
-        fixed = self.candidate.setting
-        if "factors" in fixed:
-            return {
-                f"factor_{joint}": (fixed["low"][joint], fixed["high"][joint])
-                for joint in fixed["factors"]
-            }
-        low, high = (self.candidate.cause.shown(v) for v in self.interval)
+        low, high = map(self._shown, ("low", "high"), self.interval)
         return {name: (min(low[name], high[name]), max(low[name], high[name])) for name in low}
+
+    def _shown(self, of_factors: str, value: float) -> dict[str, Any]:
+        """A value of the parameter as a person reads it; of all-joint effects each factor."""
+        factors = self.candidate.setting.get(of_factors)
+        if factors is None:
+            return self.candidate.cause.shown(value)
+        return {f"factor_{joint}": factor for joint, factor in factors.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -690,11 +678,10 @@ def _explained(
     others = [k for k in best.members if k >= len(moving)]
     context = finding.posterior.contexts[best.context]
     block = context if isinstance(context, Block) else None
-    known = np.hstack([context.shared_in, every.kept.take(others)])
-    spread = block_diag(context.covariance, np.diag(every.size[others] ** 2))
-    values, covariance = shrunk(
-        context.behind(finding.noise), effects.take(chosen), known, spread, problem.expected
-    )
+    noise = context.behind(finding.noise)
+    noise = noise.with_effects(every.kept.take(others) * every.size[others])
+    known = context.shared_in, context.covariance
+    values, covariance = shrunk(noise, effects.take(chosen), *known, problem.expected)
     count = len(chosen) + (0 if block is None else block.shared_in.shape[1])
     fitted = values[:count], covariance[:count, :count]
     return _Case(problem, finding.follows, finding.noise, scene, chosen, block, *fitted)
@@ -773,6 +760,7 @@ def _explained_by_clearances(
     wrong, also better than a constant.
     """
     from scipy.optimize import lsq_linear
+    from scipy.special import chdtri
 
     factors = lsq_linear(contribution_in, measured_in, (-1.0, 1.0)).x
     in_mm = predicted_in[:, None] - (1.0 - 1.0 / MM_PER_IN) * contribution_in
@@ -967,14 +955,12 @@ def _told(case: _Case) -> tuple[tuple[NamedCause, ...], tuple[NamedCause, ...]]:
         change = case.values[k:]
         candidate = case.block.candidate(change, case.covariance[k:, k:])
         fitted[candidate.key] = candidate, 1.0, (1.0, 1.0), case.block.shared_in @ change
-    none = np.zeros(len(case.problem.misfit))
-    for cause in {block.cause for block in case.problem.blocks}:
-        fitted.setdefault((cause.name, None), (Candidate(cause), 0.0, (0.0, 0.0), none))
+    rivals = {block.name: Candidate(block.cause) for block in case.problem.blocks}
 
     def found(key: Key) -> NamedCause:
         if key not in fitted:
-            rival = case.problem.likeliest(key, case.posterior)
-            fitted[key] = case.problem.candidates[rival], 0.0, (0.0, 0.0), none
+            rival = rivals.get(key) or case.problem.likeliest(key, case.posterior)[1]
+            fitted[key] = rival, 0.0, (0.0, 0.0), np.zeros(len(case.problem.misfit))
         return NamedCause(*fitted[key], follows.probability(key), follows.class_probability(key))
 
     named = sorted((found(key) for key in follows.said), key=lambda cause: -cause.effect_rms_in)
@@ -999,7 +985,7 @@ def _further(case: _Case, open_: tuple[NamedCause, ...]) -> FurtherInspections |
     apart = np.zeros(len(table))
     none = np.empty((len(table), 0))
     for rival, sign in zip(rivals, (1.0, -1.0), strict=False):
-        column = problem.columns.take([problem.likeliest(rival.key, case.posterior)])
+        column = problem.columns.take([problem.likeliest(rival.key, case.posterior)[0]])
         value = shrunk(noise, column, none, np.empty((0, 0)), problem.expected)[0]
         apart += sign * (column @ value)
     latest = np.array([rows[-1] for rows in visits(table).values()])

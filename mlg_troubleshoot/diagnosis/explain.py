@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mlg_troubleshoot.arrays import Array, Mask, Wholes, log_sum, numbered, rms
+from mlg_troubleshoot.arrays import Array, Wholes, log_sum, numbered, rms
 from mlg_troubleshoot.diagnosis.causes.base import Candidate, Cause, Scene, levels
 from mlg_troubleshoot.diagnosis.causes.linkage import Block
 from mlg_troubleshoot.diagnosis.noise import Rows, build_noise, less_expected, standardised
@@ -150,13 +150,10 @@ def _populations(scene: Scene) -> Iterator[Array]:
     order = names[np.argsort(level, kind="stable")]
     splits = range(3, len(names) - 2)
     if splits:
-        rows = [np.isin(tails, order[k:]) for k in splits]
-        within = [_within(misfit, own) for own in rows]
-        yield rows[int(np.argmin(within))].astype(float)
-
-
-def _within(misfit: Array, rows: Mask) -> float:
-    return float(sum(np.mean(own) * np.var(misfit[own]) for own in (rows, ~rows)))
+        yield min(
+            (np.isin(tails, order[k:]) for k in splits),
+            key=lambda own: sum(np.mean(x) * np.var(misfit[x]) for x in (own, ~own)),
+        ).astype(float)
 
 
 def _quantities(scene: Scene) -> dict[str, Array]:
@@ -180,22 +177,24 @@ def _distinct(
     """Drop shapes that are constant, or that a candidate of the catalogue has already; but one that
     is the same in all rows.
     """
-    n = len(catalogue.full)
+    n = catalogue.n
     mean = catalogue.onto(np.full((1, n), 1.0 / n))[0]
     size = np.sqrt(np.maximum(catalogue.squares / n - mean**2, 0.0))
     varying = np.flatnonzero(size)
-    varied = (s for s in shapes if np.std(s[0]) > 1e-9 * np.max(np.abs(s[0])))
     names = list[tuple[str, ...]]()
 
     def kept() -> Iterator[Array]:
-        while block := list(islice(varied, _AT_ONCE)):
-            scores = np.array([(shape - shape.mean()) / shape.std() for shape, _names in block])
-            product = catalogue.onto(scores)[:, varying] / (n * size[varying])
-            alike = np.max(np.abs(product), axis=1, initial=0.0)
-            for (shape, own), near in zip(block, alike.tolist(), strict=True):
-                if near < 0.97:
-                    names.append(own)
-                    yield shape / rms(shape[shape != 0.0])
+        while block := list(islice(shapes, _AT_ONCE)):
+            rows = np.array([shape for shape, _names in block])
+            apart = rows - rows.mean(axis=1, keepdims=True)
+            product = np.abs(catalogue.onto(apart)[:, varying]) / (n * size[varying])
+            alike = np.max(product, axis=1, initial=0.0)
+            spread = apart.std(axis=1)
+            new = (spread > 1e-9 * np.abs(rows).max(axis=1)) & (alike < 0.97 * spread)
+            for place in np.flatnonzero(new).tolist():
+                shape, own = block[place]
+                names.append(own)
+                yield shape / rms(shape[shape != 0.0])
 
     columns = EffectColumns.made(n, chain(kept(), [np.ones(n)]))
     return columns, (*names, ("all rows",))
@@ -259,10 +258,10 @@ class MisfitProblem:
         slips = EffectColumns.made(n, (np.eye(1, n, place)[0] for place in far))
         return EffectColumns.joined([self.columns, self.bank.columns, slips])
 
-    def likeliest(self, key: Key, found: MisfitPosterior) -> int:
-        """Place of the likeliest candidate of a name."""
-        own = [k for k, c in enumerate(self.candidates) if c.key == key]
-        return max(own, key=found.of_effect.item)
+    def likeliest(self, key: Key, found: MisfitPosterior) -> tuple[int, Candidate]:
+        """The likeliest candidate of a name, and its place."""
+        own = [place for place in enumerate(self.candidates) if place[1].key == key]
+        return max(own, key=lambda place: found.of_effect[place[0]])
 
     def effects(self, noise: NoiseModel) -> Effects:
         """All that may act alone, with how often and how large it is expected."""

@@ -19,9 +19,9 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from math import lgamma
 
 import numpy as np
-from scipy.special import gammaln, logsumexp
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, Probability, log_sum, numbered
 from mlg_troubleshoot.decision.columns import LANDINGS
@@ -237,7 +237,9 @@ class _Screen:
         apart = np.sum(-2.0 * wear, axis=1, where=known)
         counted = known.sum(axis=1)
         together = 0.5 * (FREEDOM + counted)
-        found = gammaln(together) - together * np.log1p(np.maximum(apart, 0.0) / FREEDOM)
+        found = np.array([*map(lgamma, together.tolist())]) - together * np.log1p(
+            np.maximum(apart, 0.0) / FREEDOM
+        )
         found -= np.sum(np.broadcast_to(np.log(spread), known.shape), axis=1, where=known)
         return np.asarray(found - 0.5 * counted * np.log(FREEDOM * np.pi))
 
@@ -259,7 +261,7 @@ class _Screen:
             return None
         near = self.near(place, self.misfit_of(place, meant[kept]))
         weighed = likely[kept] + np.where(known[kept], near, 0.0)
-        if logsumexp(weighed) - as_written < Beliefs().odds:
+        if log_sum(weighed) - as_written < Beliefs().odds:
             return None
         best = kept[np.argmax(weighed)]
         return kinds[best], meant[best]
@@ -321,14 +323,16 @@ def restored_joints(
     effect = worst_of_sense(scene.model, changed)[0] - scene.over_in
     effect = np.where(known.any(axis=1), effect, 0.0)
     habit = np.log(beliefs.expected * beliefs.unlisted / len(_RESTORED))
-    likely = []
-    chances = []
-    for left, prior in accounts:
-        for side, share in ((1.0, 0.0), *((side, s) for side in (1.0, -1.0) for s in _RESTORED)):
-            evidence, chance = _mixture(left, side * effect, share)
-            likely.append(evidence + prior + (habit if share else 0.0))
-            chances.append(chance if side > 0.0 else np.zeros(len(table)))
-    chance = np.exp(np.array(likely) - log_sum(np.array(likely))) @ np.array(chances)
+    share = np.r_[0.0, _RESTORED, _RESTORED][:, None]
+    side = np.repeat([1.0, -1.0], [1 + len(_RESTORED), len(_RESTORED)])[:, None]
+    each = [_mixture(left, side * effect, share) for left, _prior in accounts]
+    likely = np.concatenate(
+        [
+            own + prior + habit * (share[:, 0] > 0.0)
+            for (own, _chance), (_left, prior) in zip(each, accounts, strict=True)
+        ]
+    )
+    chance = np.exp(likely - log_sum(likely)) @ np.vstack([own * (side > 0.0) for _, own in each])
     found = np.flatnonzero(chance >= beliefs.sure)
     clearance = written.copy()
     if len(found):
@@ -346,24 +350,25 @@ def restored_joints(
     )
 
 
-def _mixture(left: Array, effect: Array, share: float) -> tuple[float, Array]:
-    """Log-likelihood of residuals of which a share has an effect, and how likely each row has it;
-    level and scatter by expectation and maximisation.
+def _mixture(left: Array, effect: Array, share: Array) -> tuple[Array, Array]:
+    """Log-likelihood of residuals of which a share, (k, 1), has an effect, (k, n), and how likely
+    each row has it; level and scatter by expectation and maximisation.
     """
-    off = np.column_stack([left, left - effect])
-    level = float(np.median(left))
-    scatter = _scale(left)
-    prior = np.log([1.0 - share, share]) if share else np.array([0.0, -np.inf])
+    off = np.array(np.broadcast_arrays(left, left - effect))
+    level = np.median(left)
+    scatter = np.array(_scale(left))
+    with np.errstate(divide="ignore"):
+        prior = np.log([1.0 - share, share])
     for _ in range(_MIXTURE_ROUNDS):
         each = prior + student(off - level, scatter)
-        total = log_sum(each.T)
-        chance = np.exp(each - total[:, None])
+        total = log_sum(each)
+        chance = np.exp(each - total)
         # Rows far out in the tails of Student's t count less.
         far = chance * (FREEDOM + 1.0) / (FREEDOM + ((off - level) / scatter) ** 2)
-        level = float(np.sum(far * off) / far.sum())
-        scatter = float(np.sqrt(np.sum(far * (off - level) ** 2) / len(left)))
-        scatter = max(scatter, _LEAST_SPREAD_IN)
-    return float(total.sum()), chance[:, 1]
+        level = np.sum(far * off, (0, 2), keepdims=True) / far.sum((0, 2), keepdims=True)
+        square = np.sum(far * (off - level) ** 2, (0, 2), keepdims=True) / len(left)
+        scatter = np.maximum(np.sqrt(square), _LEAST_SPREAD_IN)
+    return total.sum(axis=1), chance[1]
 
 
 def _suspects(

@@ -9,10 +9,10 @@ is part of the covariance; what stands out against it is an effect.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from mlg_troubleshoot.arrays import Array, numbered, rms
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
@@ -266,7 +266,7 @@ def _ratio(noise: NoiseModel, levels: Array, rest: Array) -> float:
     likelihood = 0.5 * np.sum(pull / (1.0 + weight) - np.log1p(weight), axis=1)
     likelihood -= 0.5 * (np.log(_RATIOS / USUAL_RATIO) / RATIO_SPREAD) ** 2
     chance = np.exp(likelihood - likelihood.max())
-    largest = float(ndtri(1.0 - 0.25 / count)) ** 2 / count
+    largest = NormalDist().inv_cdf(1.0 - 0.25 / count) ** 2 / count
     return float(np.sqrt(chance @ _RATIOS**2 / chance.sum() / (1.0 - largest)))
 
 

@@ -197,16 +197,12 @@ def _groups(texts: Sequence[str]) -> bool:
 
 def _own_numbers(texts: Sequence[str]) -> list[float] | None:
     """Cells of a column as numbers, or as days where all are dates; None if one is neither."""
-    for read in (float, _day_number):
+    for read in (float, lambda text: float(datetime.fromisoformat(text).toordinal())):
         try:
             return [read(text) if text else np.nan for text in texts]
         except ValueError:
             continue
     return None
-
-
-def _day_number(text: str) -> float:
-    return float(datetime.fromisoformat(text).toordinal())
 
 
 def _own_columns(

@@ -9,10 +9,10 @@ together by expectation maximisation (Laird and Ware 1982).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, lasting_falls, numbered
 from mlg_troubleshoot.diagnosis.table import DiagnosisTable
@@ -245,9 +245,14 @@ def wear_history(reading_in: Array, gears: Places, kilo: Array, reading_in2: Arr
     y = np.where(known, y, 0.0)
     here = known.astype(float)
     declared = np.maximum(reading_in2.reshape(y.shape), _TIGHT_IN**2)
-    by_gear = csr_array((np.ones(len(gears)), (gears, np.arange(len(gears)))))
+    order = np.argsort(gears, kind="stable")
+    starts = np.unique(gears[order], return_index=True)[1]
+
+    def by_gear(values: Array) -> Array:
+        return np.add.reduceat(values[order], starts)
+
     # Gears of which a joint was never read say nothing about the fleet.
-    read = by_gear @ here
+    read = by_gear(here)
     many = known & (read[gears] >= 3)
     mean = y.sum(axis=0) / np.maximum(here.sum(axis=0), 1.0)
     fleet, spread = _fleet(x, y, here)
@@ -311,7 +316,12 @@ def _fleet(x: Array, y: Array, here: Array) -> tuple[Array, Array]:
 
 
 def _lines(
-    by_gear: csr_array, x: Array, y: Array, weight: Array, fleet: Array, spread: Array
+    by_gear: Callable[[Array], Array],
+    x: Array,
+    y: Array,
+    weight: Array,
+    fleet: Array,
+    spread: Array,
 ) -> tuple[Array, Array]:
     """Level and rate of each gear drawn to the fleet's, (2, n_gears, n_joints), and their
     covariances (aa, ab, bb).
@@ -319,7 +329,7 @@ def _lines(
     of_level, of_both, of_rate = spread
     p = np.array([of_rate, -of_both, of_level]) / (of_level * of_rate - of_both**2)
     j = weight.shape[1]
-    sums = by_gear @ np.hstack([weight, weight * x, weight * x * x, weight * y, weight * x * y])
+    sums = by_gear(np.hstack([weight, weight * x, weight * x * x, weight * y, weight * x * y]))
     w, wx, wxx, wy, wxy = sums.reshape(len(sums), 5, j).swapaxes(0, 1)
     aa = w + p[0]
     ab = wx + p[1]

@@ -26,9 +26,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solve_triangular
-from scipy.sparse import csc_array, csr_array, hstack
-from scipy.special import stdtrit
 
 from mlg_troubleshoot.arrays import Array, Mask, Places, Wholes
 
@@ -45,16 +42,14 @@ class EffectColumns:
 
     Attributes
     ----------
-    full : ndarray, shape (n, f)
-        Those that are written out.
-    few : csc_array, shape (n, p - f)
-        Those that act in few rows.
+    parts : sequence of ndarray or csc_array
+        Those that are written out, shape (n, f); in a large table also those that act in few rows,
+        shape (n, p - f).
     at : ndarray of int, shape (p,)
         Place of each column among the two, those that are written out first.
     """
 
-    full: Array
-    few: csc_array
+    parts: Sequence[Any]
     at: Places
 
     @staticmethod
@@ -62,37 +57,48 @@ class EffectColumns:
         """Columns that are written out, or kept so already."""
         if isinstance(columns, EffectColumns):
             return columns
-        n, p = columns.shape
-        return EffectColumns(columns, csc_array((n, 0)), np.arange(p))
+        return EffectColumns([columns], np.arange(columns.shape[1]))
 
     @staticmethod
     def made(n: int, columns: Iterable[Array]) -> EffectColumns:
         """Columns as they come, each kept as is shorter."""
         full: list[Array] = []
-        few: list[tuple[Places, Array]] = []
+        few: list[tuple[Array, Places]] = []
         is_short: list[bool] = []
         for column in columns:
             rows = np.flatnonzero(column)
             short = n > _LARGE and _FEW * len(rows) < n
             is_short.append(short)
             if short:
-                few.append((rows, column[rows]))
+                few.append((column[rows], rows))
             else:
                 full.append(column)
-        ends = np.cumsum([0, *(len(rows) for rows, _values in few)])
-        rows = np.concatenate([np.empty(0, np.intp), *(rows for rows, _values in few)])
-        values = np.concatenate([np.empty(0), *(values for _rows, values in few)])
         written = np.column_stack([np.empty((n, 0)), *full])
+        if not few:
+            return EffectColumns.of(written)
+        from scipy.sparse import csc_array
+
+        ends = np.cumsum([0, *(len(rows) for _values, rows in few)])
+        values, rows = (np.concatenate(own) for own in zip(*few, strict=True))
         short_ones = csc_array((values, rows, ends), (n, len(few)))
-        return EffectColumns(written, short_ones, _places_of(is_short))
+        return EffectColumns([written, short_ones], _places_of(is_short))
 
     @staticmethod
     def joined(parts: Sequence[EffectColumns]) -> EffectColumns:
         """All columns of several, one after the other."""
-        is_short = [own >= part.full.shape[1] for part in parts for own in part.at.tolist()]
-        full = np.hstack([part.full for part in parts])
-        few = csc_array(hstack([part.few for part in parts]))
-        return EffectColumns(full, few, _places_of(is_short))
+        is_short = [own >= part.parts[0].shape[1] for part in parts for own in part.at.tolist()]
+        full = np.hstack([part.parts[0] for part in parts])
+        few = [own for part in parts for own in part.parts[1:]]
+        if not few:
+            return EffectColumns.of(full)
+        from scipy.sparse import hstack
+
+        return EffectColumns([full, hstack(few, "csc")], _places_of(is_short))
+
+    @property
+    def n(self) -> int:
+        """Number of rows."""
+        return len(self.parts[0])
 
     @property
     def p(self) -> int:
@@ -102,50 +108,52 @@ class EffectColumns:
     def take(self, wanted: Sequence[int] | Places) -> Array:
         """Some of the columns written out, shape (n, k)."""
         at = self.at[np.asarray(wanted, np.intp)]
-        f = self.full.shape[1]
-        if not self.few.shape[1]:
-            return self.full[:, at]
-        found = np.empty((len(self.full), len(at)))
-        found[:, at < f] = self.full[:, at[at < f]]
-        found[:, at >= f] = self.few[:, at[at >= f] - f].toarray()
+        full, *few = self.parts
+        if not few:
+            return np.asarray(full[:, at])
+        f = full.shape[1]
+        found = np.empty((self.n, len(at)))
+        found[:, at < f] = full[:, at[at < f]]
+        found[:, at >= f] = few[0][:, at[at >= f] - f].toarray()
         return found
 
-    def onto(self, rows: Array | csr_array) -> Array:
+    def onto(self, rows: Any) -> Array:
         """Products of all columns with some vectors, shape (k, n): (k, p)."""
-        if not self.few.shape[1]:
-            return np.asarray(rows @ self.full)
-        few: Any = rows @ self.few
-        short = few.toarray() if hasattr(few, "toarray") else few
-        return np.hstack([rows @ self.full, short])[:, self.at]
+        full, *few = (rows @ part for part in self.parts)
+        short = [own.toarray() if hasattr(own, "toarray") else own for own in few]
+        return np.hstack([full, *short])[:, self.at] if few else np.asarray(full)
 
     def scaled(self, weight: Array) -> EffectColumns:
         """All columns, each row so many times."""
-        few = csc_array(self.few.multiply(weight[:, None]))
-        return EffectColumns(self.full * weight[:, None], few, self.at)
+        full, *few = self.parts
+        short = [own.multiply(weight[:, None]).tocsc() for own in few]
+        return EffectColumns([full * weight[:, None], *short], self.at)
 
     def times(self, values: Array) -> Array:
         """Sums of all columns, each so many times, (p,) or (p, k): (n,) or (n, k)."""
         placed = np.empty(values.shape)
         placed[self.at] = values
-        f = self.full.shape[1]
-        return np.asarray(self.full @ placed[:f] + self.few @ placed[f:])
+        own = np.split(placed, [self.parts[0].shape[1]])
+        return np.asarray(sum(part @ v for part, v in zip(self.parts, own, strict=False)))
 
     def squared_onto(self, weight: Array) -> Array:
         """Sum of the squares of each column, each row so many times, shape (p,)."""
-        full = np.einsum("n,nk,nk->k", weight, self.full, self.full)
-        return np.asarray(np.concatenate([full, weight @ self.few.power(2)])[self.at])
+        full, *few = self.parts
+        squares: list[Array] = [np.einsum("n,nk,nk->k", weight, full, full)]
+        squares += [weight @ own.power(2) for own in few]
+        return np.asarray(np.concatenate(squares)[self.at])
 
     @property
     def squares(self) -> Array:
         """Sum of squares of each column, shape (p,)."""
-        return self.squared_onto(np.ones(len(self.full)))
+        return self.squared_onto(np.ones(self.n))
 
     @property
     def acting(self) -> Array:
         """Root mean square of each column over the rows in which it acts, shape (p,)."""
-        written = np.count_nonzero(self.full, axis=0)
-        rows = np.concatenate([written, np.diff(self.few.indptr)])[self.at]
-        return np.asarray(np.sqrt(self.squares / np.maximum(rows, 1)))
+        full, *few = self.parts
+        rows = [np.count_nonzero(full, axis=0), *(np.diff(own.indptr) for own in few)]
+        return np.asarray(np.sqrt(self.squares / np.maximum(np.concatenate(rows)[self.at], 1)))
 
 
 def _places_of(is_short: Sequence[bool]) -> Places:
@@ -232,20 +240,11 @@ class NoiseModel:
             return np.zeros(len(self.relative))
         return np.where(self.far_out > 1.0, FAR * self.far_out, 0.0)
 
-    def floored(self, square: Array) -> Array:
-        """Add what no row can be better than to a residual sum of squares."""
-        return np.maximum(square, 0.0) + len(self.relative) * self.floor_in**2
-
     def take(self, rows: Mask) -> NoiseModel:
         """Return the noise of some of the rows."""
         every = {f.name: getattr(self, f.name) for f in fields(self)}
         own: dict[str, Any] = {k: v[rows] for k, v in every.items() if isinstance(v, np.ndarray)}
         return replace(self, **own)
-
-    @property
-    def worth(self) -> float:
-        """Independent rows that would say as much of a constant. [1]"""
-        return len(self.relative) * (1.0 - self.correlation) / (1.0 + self.correlation)
 
     @cached_property
     def _steps(self) -> tuple[Wholes, Wholes, Array]:
@@ -282,10 +281,6 @@ class NoiseModel:
         """Add effects of unknown size, each at one standard deviation."""
         return replace(self, loadings=np.hstack([self.loadings, effects_in / self.scale_in]))
 
-    def with_tails_apart(self, scatter_in: Array) -> NoiseModel:
-        """Add what the rows of each tail have in common, (n, k), at one standard deviation."""
-        return replace(self, of_tail=scatter_in / self.scale_in)
-
     def share_of(self, effects_in: Array, data: Array) -> Array:
         """What effects of unknown size that are part of this covariance most likely explain of data
         (BLUP). [in]
@@ -304,7 +299,7 @@ class NoiseModel:
         of the rows that is left to tell it. [in, 1]
         """
         joint, _root, _between, roots, _log = self._common
-        common, apart = self._low(joint.take(np.arange(joint.p)).T)
+        common, apart = self._low(joint.take(joint.at).T)
         low = np.vstack([common, roots[-1] @ apart])
         own = self.own(data[:, None])[:, 0]
         left = own - low.T @ (low @ own)
@@ -322,17 +317,20 @@ class NoiseModel:
         kinds = [(group, scatter) for group, scatter in kinds if scatter.any()]
         t = (int(self.tails.max()) + 1) * any(self.tail_ratios)
         kinds += [(self.tails, np.ones(n))] * bool(t)
-        groups = [csc_array((own, (np.arange(n), group))) for group, own in kinds]
-        few = csc_array(hstack([csc_array((n, 0)), *groups]))
-        joint = EffectColumns(self.loadings, few, np.arange(self.loadings.shape[1] + few.shape[1]))
         if self.correlation or n <= _LARGE:
-            joint = EffectColumns.of(self.own(joint.take(joint.at)))
+            each = [own[:, None] * np.eye(group.max() + 1)[group] for group, own in kinds]
+            joint = EffectColumns.of(self.own(np.hstack([self.loadings, *each])))
         else:
-            joint = joint.scaled(1.0 / self.relative)
-        inner = np.vstack([joint.onto(joint.full.T), joint.onto(joint.few.T)])
+            from scipy.sparse import csc_array, hstack
+
+            groups = [csc_array((own, (np.arange(n), group))) for group, own in kinds]
+            parts = [self.loadings, hstack([csc_array((n, 0)), *groups], "csc")]
+            places = np.arange(sum(part.shape[1] for part in parts))
+            joint = EffectColumns(parts, places).scaled(1.0 / self.relative)
+        inner = np.vstack([joint.onto(part.T) for part in joint.parts])
         c = joint.p - t
         lower = np.linalg.cholesky(np.eye(c) + inner[:c, :c])
-        root = solve_triangular(lower, np.eye(c), lower=True)
+        root = np.linalg.inv(lower)
         between = root @ inner[:c, c:]
         ratios = np.array(self.tail_ratios)[:, None, None]
         apart = inner[c:, c:] - between.T @ between
@@ -386,10 +384,9 @@ class NoiseModel:
         joint = joint.scaled(scale)
         common = []
         # All at once would fill the memory.
-        every: Any = (columns.full.T, columns.few.T)
-        for rows in every:
-            for start in range(0, rows.shape[0], _AT_ONCE):
-                low, apart = self._low(joint.onto(rows[start : start + _AT_ONCE]).T)
+        for part in columns.parts:
+            for start in range(0, part.shape[1], _AT_ONCE):
+                low, apart = self._low(joint.onto(part.T[start : start + _AT_ONCE]).T)
                 common.append(np.sum(low**2, axis=0) + np.sum((roots @ apart) ** 2, axis=1))
         whole = np.hstack([np.empty((len(roots), 0)), *common])
         return np.asarray(columns.squared_onto(scale**2) - whole[:, columns.at])
@@ -420,7 +417,12 @@ class Fit:
     @property
     def half_width(self) -> Array:
         """Half the 95 % interval of each parameter, by Student's t of the rows that are left."""
-        rows = self.noise.worth - self.noise.absorbed - len(self.values)
+        from scipy.special import stdtrit
+
+        noise = self.noise
+        # Rows that are alike say as much of a constant as so many independent ones.
+        worth = len(noise.relative) * (1.0 - noise.correlation) / (1.0 + noise.correlation)
+        rows = worth - noise.absorbed - len(self.values)
         return self.errors * stdtrit(max(rows, 1.0), 0.975)
 
 
@@ -452,7 +454,8 @@ def fit(noise: NoiseModel, columns: Array, data: Array) -> Fit:
         inner = columns.T @ product[:, :k]
         inverse = np.linalg.pinv(inner)
         values = inverse @ (columns.T @ product[:, k])
-        rest = float(noise.floored(data @ product[:, k] - values @ inner @ values))
+        square = float(data @ product[:, k] - values @ inner @ values)
+        rest = max(square, 0.0) + len(data) * noise.floor_in**2
         likelihood = chance - 0.5 * n * np.log(rest / n) - 0.5 * log_determinant
         if best is None or likelihood > best.log_likelihood:
             scale = np.sqrt(rest / max(n - k, 1))

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import cholesky, orth
 from threadpoolctl import threadpool_limits
 
 from mlg_troubleshoot.arrays import Array, Places, Wholes, numbered, rms
@@ -450,6 +449,8 @@ class _Study:
     @cached_property
     def noise(self) -> NoiseModel:
         """What rows do when nothing is wrong; nuisance parameters may have any value."""
+        from scipy.linalg import orth
+
         relative = (self.scale / self.unit)[:, None]
         free = self.columns[:, self.count :] / relative
         basis = orth(free / np.maximum(np.linalg.norm(free, axis=0), 1e-300), 1e-7)
@@ -535,7 +536,8 @@ class _Study:
 
         noise = self.linear(chosen, context).noise
         bare = replace(noise, loadings=noise.loadings[:, noise.absorbed :], absorbed=0)
-        white = cholesky(bare.precision_times(np.eye(len(self.unit)))) / self.unit
+        precision = bare.precision_times(np.eye(len(self.unit)))
+        white = np.linalg.cholesky(precision).T / self.unit
         placed = np.eye(len(self.changes))[free]
         low, high = self.ends[:, free]
 

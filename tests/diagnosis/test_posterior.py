@@ -333,7 +333,7 @@ def test_effects_that_are_kept_by_their_rows_are_as_likely_as_written_out(monkey
     monkeypatch.setattr("mlg_troubleshoot.misfit.columns._LARGE", 0)
     few = np.where(np.arange(N)[:, None] < [N, N, 3, 5, 2, 1], COLUMNS, 0.0)
     kept = EffectColumns.made(N, iter(few.T))
-    assert kept.few.shape == (N, 4)
+    assert kept.parts[1].shape == (N, 4)
     short, whole = (
         posterior(NOISE, DATA, replace(FREE, columns=columns), CONTEXTS, BELIEFS)
         for columns in (kept, few)

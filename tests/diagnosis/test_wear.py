@@ -131,9 +131,8 @@ def test_a_gear_s_line_is_that_of_a_linear_mixed_model() -> None:
     gears, x = np.repeat(np.arange(3), [1, 4, 6]), rng.uniform(0.2, 2.0, (11, 1))
     y, weight = rng.normal(1.0, 0.3, (11, 1)), rng.uniform(5.0, 20.0, (11, 1))
     fleet, spread = np.array([[0.6], [0.4]]), np.array([[0.05], [-0.02], [0.03]])
-    lines, unsure = _lines(
-        (np.arange(3)[:, None] == gears).astype(float), x, y, weight, fleet, spread
-    )
+    of_gears = (np.arange(3)[:, None] == gears).astype(float)
+    lines, unsure = _lines(of_gears.__matmul__, x, y, weight, fleet, spread)
     prior = np.linalg.inv(np.array([[0.05, -0.02], [-0.02, 0.03]]))
     for gear in range(3):
         own = gears == gear

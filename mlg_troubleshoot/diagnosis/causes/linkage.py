@@ -15,11 +15,10 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import ClassVar
 
 import numpy as np
-from scipy.linalg import block_diag
-from scipy.special import ndtri
 
 from mlg_troubleshoot.arrays import Array
 from mlg_troubleshoot.diagnosis.causes.base import (
@@ -455,8 +454,9 @@ class LoadDirections(JointFactors):
         """All spreads of angles: cos φ − 1 for normal angles φ of each, and for ones all around."""
         joints, columns = self.joints(scene)
         half = (np.arange(_LIKELY) + 0.5) / _LIKELY
+        scores = np.array([*map(NormalDist().inv_cdf, (0.5 + 0.5 * half).tolist())])
         for s in np.radians(SPREADS_DEG):
-            angles = np.pi * half if s >= np.pi else s * ndtri(0.5 + 0.5 * half)
+            angles = np.pi * half if s >= np.pi else s * scores
             changes = np.cos(angles) - 1.0
             yield Block(
                 (self.name, None),
@@ -505,11 +505,12 @@ class OtherGeometry(JointFactors):
         # read in.
         closes = np.isfinite(bent).all(axis=1)
         bent = bent[closes]
-        even = np.eye(len(bent)) / max(len(bent), 1)
+        even = np.diag(np.repeat([0.0, 1.0 / max(len(bent), 1)], [len(used), len(bent)]))
+        known = spread[np.ix_(used, used)]
         ways = [
             (
                 bent,
-                block_diag(share**2 * spread[np.ix_(used, used)] + alike**2, share**2 * even),
+                np.pad(share**2 * known + alike**2, (0, len(bent))) + share**2 * even,
                 0.5 / len(LINKAGES),
             )
             for share, alike in LINKAGES
@@ -523,7 +524,7 @@ class OtherGeometry(JointFactors):
                 (self.name, None),
                 float(np.log(share)),
                 np.column_stack([columns, *further]),
-                np.linalg.cholesky(covariance),
+                np.asarray(np.linalg.cholesky(covariance)),
                 cause=self,
                 joints=joints,
             )

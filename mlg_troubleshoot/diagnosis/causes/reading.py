@@ -463,18 +463,14 @@ def _stretches(
             )
 
 
-def _rows_of(table: DiagnosisTable, setting: Any) -> Mask:
-    """Rows of the group, within its days if it has some, shape (n,)."""
+def as_meant(table: DiagnosisTable, setting: Any) -> DiagnosisTable:
+    """The table with the clearances of the group, within its days if it has some, as they were
+    meant.
+    """
     rows = np.asarray(table.factors[setting["column"]] == setting["value"])
     if "days" in setting:
         first, last = setting["days"]
         rows &= (table.quantities["day"] >= first) & (table.quantities["day"] <= last)
-    return rows
-
-
-def as_meant(table: DiagnosisTable, setting: Any) -> DiagnosisTable:
-    """The table with the clearances of the group as they were meant."""
-    rows = _rows_of(table, setting)
     factor = np.where(rows, 1.0 / setting["written_factor"], 1.0)
     return replace(
         table,
