@@ -225,8 +225,10 @@ def _label(entry: Any, index: int) -> str | int:
     """Return what an entry of a list calls itself, or which one it is."""
     named = entry if isinstance(entry, dict) else {}
     label = named.get("name", named.get("joint"))
-    is_number = isinstance(label, int) and abs(label) <= LARGEST
-    is_shown = is_name(label) if isinstance(label, str) else is_number
+    is_shown = isinstance(label, int) and abs(label) <= LARGEST
+    if isinstance(label, str):
+        # Short, and without control characters or turned directions.
+        is_shown = label.isprintable() and label.strip() != "" and len(label) <= LONGEST_NAME
     return str(label) if is_shown else index + 1
 
 
@@ -357,10 +359,3 @@ def _range(info: Any) -> str:
     if info.ge is None or info.ge <= -LARGEST:
         return ""
     return f" from {info.ge:g} to {info.le:g}" if has_most else f" of {info.ge:g} or more"
-
-
-def is_name(text: str) -> bool:
-    """Tell whether a text can be the name of a part: short, and without control characters or
-    turned directions.
-    """
-    return 0 < len(text) <= LONGEST_NAME and text.isprintable() and not text.isspace()
