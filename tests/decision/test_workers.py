@@ -40,7 +40,7 @@ def process_and_rows(judgements: Sequence[Judgement]) -> tuple[int, int]:
 
 @dataclass
 class Told:
-    """What a check of three blocks on two workers told while it ran."""
+    """What a check of two blocks on two workers told while it ran."""
 
     rows: list[int | None] = field(default_factory=list)
     made: list[tuple[int, int]] = field(default_factory=list)
@@ -62,7 +62,7 @@ def told() -> Told:
         ]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(task, "AT_ONCE", 20)
+        patch.setattr(task, "AT_ONCE", 40)
         found = check_files(
             [BATCH],
             CheckOptions(workers=2),
@@ -91,7 +91,7 @@ def test_any_executor_finds_the_same(told: Told, monkeypatch: pytest.MonkeyPatch
 
 
 def test_progress_counts_rows_whoever_judges_them(told: Told) -> None:
-    assert told.counts == [(20, 46), (40, 46), (46, 46)]
+    assert told.counts == [(40, 46), (46, 46)]
 
 
 def test_outputs_are_asked_for_once_and_receive_the_rows_in_their_order(told: Told) -> None:
@@ -99,7 +99,7 @@ def test_outputs_are_asked_for_once_and_receive_the_rows_in_their_order(told: To
 
 
 def test_what_is_written_of_a_block_is_made_where_it_is_judged(told: Told) -> None:
-    assert [count for _process, count in told.made] == [20, 20, 6]
+    assert [count for _process, count in told.made] == [40, 6]
     assert os.getpid() not in dict(told.made)
 
 
