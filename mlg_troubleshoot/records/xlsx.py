@@ -14,7 +14,7 @@ import io
 import re
 import warnings
 from collections.abc import Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from string import ascii_letters
 from typing import Any, cast
 from xml.etree.ElementTree import Element, TreeBuilder, XMLParser, fromstring, iterparse
@@ -51,7 +51,6 @@ from mlg_troubleshoot.records.csvfile import (
     GuardedZip,
     Stream,
     damage,
-    damaged,
     outside_limits,
     too_large,
 )
@@ -128,14 +127,14 @@ class XlsxFile(Workbook):
         return frozenset(str(index) for index, style in styles if style.get("fontId") in fonts)
 
     @cached_property
-    def formats(self) -> dict[str, NumberFormat]:
+    def formats(self) -> dict[str | None, NumberFormat]:
         """Return the formats by style that do not show plain numbers."""
         root = self._styles
         codes = {
             number.get("numFmtId"): number.get("formatCode", "")
             for number in root.iterfind(".//{*}numFmt")
         }
-        found: dict[str, NumberFormat] = {}
+        found: dict[str | None, NumberFormat] = {}
         for index, style in enumerate(root.iterfind("{*}cellXfs/{*}xf")):
             known = style.get("numFmtId", "0")
             number = int(known) if re.fullmatch(r"[0-9]{1,5}", known) else 0
@@ -145,6 +144,12 @@ class XlsxFile(Workbook):
         return found
 
 
+@lru_cache(1024)
+def _index(letters: str) -> int:
+    """The column of a cell, counted from 0."""
+    return column_index_from_string(letters) - 1
+
+
 def _text(element: Element) -> str | None:
     """Return the text of a cell, without its pronunciation and the marks of footnotes; what is
     struck through stands between ~~, which no number has. None if it is blank.
@@ -152,6 +157,9 @@ def _text(element: Element) -> str | None:
     pieces = []
     for run in element:
         if run.tag == _PHONETIC_TAG or (len(run) and run.find(_RAISED) is not None):
+            continue
+        if run.tag == _TEXT_TAG:
+            pieces.append(run.text or "")
             continue
         text = "".join(t.text or "" for t in run.iter(_TEXT_TAG))
         pieces.append(f"~~{text}~~" if len(run) and _is_struck(run.find(_FONT_OF_RUN)) else text)
@@ -164,7 +172,7 @@ def _is_struck(font: Element | None) -> bool:
 
 
 def _shown(text: str) -> str | None:
-    text = unescape(text)
+    text = unescape(text) if "_x" in text else text
     return text if text and not text.isspace() else None
 
 
@@ -218,7 +226,9 @@ class XlsxSheet(Sheet):
                 index = -1
                 row = str(number)
                 for each in element:
-                    index = self._index(each.get("r"), row, index + 1)
+                    reference = each.get("r")
+                    # Without a reference it follows the one before.
+                    index = index + 1 if reference is None else _index(reference.removesuffix(row))
                     cell = self._cell(each, index)
                     if cell is None:
                         continue
@@ -231,30 +241,16 @@ class XlsxSheet(Sheet):
                 if cells:
                     yield number, cells
 
-    def _index(self, reference: str | None, row: str, following: int) -> int:
-        """The column of a cell, counted from 0; without a reference it follows the one before."""
-        if reference is None:
-            return following
-        letters = reference.removesuffix(row)
-        if not letters.isalpha():
-            raise damaged(f"cell {reference!r} of sheet {self.name!r} is in row {row}")
-        return column_index_from_string(letters) - 1
-
     def _cell(self, element: Element, index: int) -> Cell:
-        value = inline = None
-        has_formula = False
-        for child in element:
-            if child.tag == VALUE_TAG:
-                value = child.text
-            elif child.tag == INLINE_STRING:
-                inline = child
-            has_formula = has_formula or child.tag == FORMULA_TAG
+        value = element.findtext(VALUE_TAG)
+        has_formula = element.find(FORMULA_TAG) is not None
         style = element.get("s")
         if value:
             cell = self._value(element.get("t", "n"), style, value)
         elif has_formula:
             cell = None if element.get("t") == "str" else OddCell(OddKind.NO_VALUE, NO_VALUE_TEXT)
         else:
+            inline = element.find(INLINE_STRING)
             cell = None if inline is None else _text(inline)
         if cell is not None and style in self.book.struck:
             self.struck[index] += 1
@@ -265,9 +261,9 @@ class XlsxSheet(Sheet):
     def _value(self, kind: str, style: str | None, value: str) -> Cell:
         if kind == "n":
             number = float(value)
-            if vanishes(value, number):
+            if not number and vanishes(value, number):
                 return value
-            shown = self.book.formats.get(style) if style else None
+            shown = self.book.formats.get(style)
             epoch = self.book.epoch_1904
             return number if shown is None else shown.cell(number, epoch_1904=epoch)
         if kind == "s":
