@@ -85,7 +85,7 @@ def clearances_alone(source: Frame, joints: Joints) -> pd.DataFrame:
     kept = [
         place
         for place, each in enumerate(found)
-        if each.reason or (each.field and each.field.column in (CLEARANCE, CONVENTION, UNIT))
+        if each.reason or each.column in (CLEARANCE, CONVENTION, UNIT)
     ]
     rows = list(map(str, range(len(frame))))
     return frame.iloc[:, kept].assign(record_id=rows, tail_no=rows, side="LH")

@@ -122,6 +122,10 @@ class Recognition:
     nearest: str | None = None
     code: str = "header_doubtful"
 
+    @property
+    def column(self) -> Column | None:
+        return None if self.field is None else self.field.column
+
 
 UNKNOWN = Recognition()
 # Short names at a command; some would say too little above a column.

@@ -503,22 +503,14 @@ def judge_unit(
     options: ReadOptions,
 ) -> RowUnit:
     """Judge whether the readings of a row can have been read in the unit that is stated. [in]"""
-    read = {
-        joint: value
-        for joint, value in radial_in.items()
-        if value > 0.0 and options.new_part_in.get(joint, 0.0) > 0.0
-    }
-    units = {joint: entered[joint].unit for joint in read}
+    units: dict[LengthUnit, dict[int, float]] = {}
+    for joint, value in radial_in.items():
+        if value > 0.0 and options.new_part_in.get(joint, 0.0) > 0.0:
+            units.setdefault(entered[joint].unit, {})[joint] = value
+    several = len(radial_in) >= _FEWEST
     fits = [
-        _judge_stated(
-            {joint: value for joint, value in read.items() if units[joint] is unit},
-            unit,
-            [other for other in units.values() if other.per_inch < unit.per_inch],
-            convention,
-            options,
-            several=len(radial_in) >= _FEWEST,
-        )
-        for unit in dict.fromkeys(units.values())
+        _judge_stated(read, unit, units.keys() & _larger(unit), convention, options, several)
+        for unit, read in units.items()
     ]
     return max(fits, key=lambda fit: (fit.scale, len(fit.joints)), default=RowUnit())
 
@@ -526,10 +518,9 @@ def judge_unit(
 def _judge_stated(
     read: Mapping[int, float],
     stated: LengthUnit,
-    larger: Sequence[LengthUnit],
+    larger: Collection[LengthUnit],
     convention: ClearanceConvention,
     options: ReadOptions,
-    *,
     several: bool,
 ) -> RowUnit:
     """Judge the readings of a row that state one unit; others of the row state larger ones. [in]
@@ -561,7 +552,7 @@ def _judge_stated(
         return RowUnit()
     other = LengthUnit.MILLIMETRE if stated is LengthUnit.INCH else LengthUnit.THOU
     question = (
-        f"{_readings(over, read)} above the limit: {_asked(over)} read in {other.words}, not in"
+        f"{_readings(over, read)} above the limit: {_asked(over)} {other.words}, not in"
         f" {stated.words}?"
     )
     if convention is ClearanceConvention.RADIAL:
@@ -616,7 +607,7 @@ def _small_question(
     if others:
         names = " or ".join(unit.words for unit in others)
         confirm = "" if options.asks else f" {CONFIRM_SMALL}"
-        return f"{said}: {_asked(joints)} read in {names}, not in {stated.words}?{confirm}"
+        return f"{said}: {_asked(joints)} {names}, not in {stated.words}?{confirm}"
     is_radial = convention is ClearanceConvention.RADIAL
     factor = "" if is_radial else ", or is it a radial clearance (factor 2)"
     return f"{said}: is the decimal point misplaced{factor}?"
@@ -646,7 +637,7 @@ def _readings(joints: tuple[int, ...], read: Mapping[int, float]) -> str:
 
 
 def _asked(joints: tuple[int, ...]) -> str:
-    return "were they" if len(joints) > 1 else "was it"
+    return "were they read in" if len(joints) > 1 else "was it read in"
 
 
 def scale_slip(
@@ -719,12 +710,8 @@ _NO_END = "Measure with a gauge that reaches further, or leave it blank if it wa
 
 @lru_cache(4096)
 def _tells_failure(header: str, cell: Filled) -> bool:
-    """Whether a cell says that the gear failed, or answers whether it did. One word with a digit is
-    a code; a sentence may have one, a single one may answer.
-    """
+    """Whether a cell says that the gear failed, or answers whether it did."""
     text = cell if isinstance(cell, str) else ""
-    if _CODE.fullmatch(text):
-        return False
     # The rows of a long table are carried together.
     return any(map(says_failed, text.split("; "))) or answers_outcome(header, cell)
 
@@ -756,6 +743,11 @@ class PlacedField:
     is_misread: bool = False
     visit: Occasion | None = None
     found: Recognition = UNKNOWN
+
+    @property
+    def column(self) -> Column | None:
+        """What it holds, refused or not; None if it is only carried."""
+        return None if self.field is None else self.field.column
 
     @property
     def read_as(self) -> str | None:
@@ -824,7 +816,7 @@ class RowReader:
         self._refused = [p.index for p in placed if p.refused]
         self._at = {known.column: index for index, known in reversed(good)}
         # Without a column of record ids a row is named after its place and content.
-        self._makes_ids = all(p.field is None or p.field.column is not RECORD_ID for p in placed)
+        self._makes_ids = all(p.column is not RECORD_ID for p in placed)
         # Clearances stand first, in the order of the joints, whatever the order of their columns.
         good.sort(key=lambda each: each[1].number or 0 if each[1].column is CLEARANCE else math.inf)
         self._lengths: list[tuple[int, Field, _LengthKind]] = [
@@ -865,7 +857,7 @@ class RowReader:
         taken = {column.name for column in self._at if column.carried} | {*self._unread.values()}
         for p in placed:
             self._placed[p.index] = p
-            column = None if p.field is None else p.field.column
+            column = p.column
             is_unread = column is None or column.carried
             if p.is_misread or (is_unread and not (p.refused or p.is_settled)):
                 nearest, is_sure = suspect(p.header, self._options.joints)
@@ -1290,8 +1282,8 @@ class RowReader:
     def _fault(self, index: int, fault: CellFaultError) -> None:
         """Note a fault; where the cell bears the verdict, the row cannot be judged then."""
         self._faults.append((index, fault))
-        of = self._placed[index].field
-        if of is None or of.column.bears_verdict:
+        column = self._placed[index].column
+        if column is None or column.bears_verdict:
             self._bad.add(index)
 
     def _tell(self, index: int, fault: CellFaultError) -> None:

@@ -206,8 +206,7 @@ def _with_rows_below(header: Header, rows: Sequence[NumberedRow], options: ReadO
         # What names the gear stands in front, and says nothing in a row of headings.
         words = [] if cells[0] is not None else [*map(_text, cells)]
         for text, word in zip(header.texts, words, strict=False):
-            field = recognise(text, options.joints).field if word else None
-            if field is not None and field.column in IDENTITY:
+            if word and recognise(text, options.joints).column in IDENTITY:
                 words = []
         headings = [take_apart(text, tidy(" ".join(words))) for text in words if text]
         if headings and all(each.is_said and each.is_bare for each in headings):
@@ -238,8 +237,8 @@ def _unit_row(
     if any(w not in UNIT_SPELLINGS and not _NO_UNIT.fullmatch(w) for w in words):
         return None
     for text, unit in zip(header.texts, units, strict=False):
-        known = recognise(text, options.joints).field if unit else None
-        if known is not None and not known.column.is_length:
+        known = recognise(text, options.joints).column if unit else None
+        if known is not None and not known.is_length:
             return None
     return units if any(units) else None
 
@@ -276,12 +275,11 @@ class Columns:
             if known is not None:
                 known = replace(known, unit=known.unit or unit)
             refused = bool(found.reason)
-            named = recognise(text, self._options.joints).field if is_settled else None
-            meant = None if known is None else known.column
-            misread = named is not None and named.column.bears_verdict and named.column != meant
-            self.placed.append(
-                PlacedField(index, text, known, refused, place, is_settled, misread, found=found)
-            )
+            named = recognise(text, self._options.joints).column if is_settled else None
+            placed = PlacedField(index, text, known, refused, place, is_settled, found=found)
+            if named is not None and named.bears_verdict:
+                placed.is_misread = named is not placed.column
+            self.placed.append(placed)
         if any(p.field is None and not p.is_settled for p in self.placed):
             self._settle_visits(header.units)
         if not self.at(CLEARANCE):
@@ -295,7 +293,7 @@ class Columns:
 
     def at(self, *columns: Column) -> list[int]:
         """Where some columns stand, refused or not."""
-        return [p.index for p in self.placed if p.field is not None and p.field.column in columns]
+        return [p.index for p in self.placed if p.column in columns]
 
     def notes(self) -> tuple[str, str, list[str]]:
         """Say how the headers were read, all in one note, and what is only carried, in another,
@@ -756,8 +754,7 @@ def _heading(index: int, rows: Sequence[Cells]) -> str:
 
 
 def _column(cell: Cell, options: ReadOptions) -> Column | None:
-    field = _understood(cell, "", options)[0].field if isinstance(cell, str) else None
-    return None if field is None else field.column
+    return _understood(cell, "", options)[0].column if isinstance(cell, str) else None
 
 
 def _is_number(cell: Cell) -> bool:
@@ -965,17 +962,18 @@ def _read_one(
     below: Header | None = None
     form = header if isinstance(header, Form) else None
     first = list(islice(rows, _LOOKED_AT))
-    filled = first if form is None else [(header.row + 1, form.as_row.cells)]
-    options, side, said = _sides(sheet.name, header, filled, options, file)
+    filled = [cells for number, cells in first if number > header.row]
+    filled = filled if form is None else [form.as_row.cells]
+    options, said = _sides(sheet.name, header, filled, options, file)
     placed = ""
     if form is None:
         placed = f"the header is in row {' and '.join(map(str, header.rows_used))}"
         if sheet.delimiter is None:
-            wide = max((len(cells) for number, cells in first if number > header.row), default=0)
+            wide = max(map(len, filled), default=0)
             blank = ("",) * (wide - len(header.texts))
             header = replace(header, texts=(*header.texts, *blank))
     comma = options.decimal_comma or sheet.delimiter == ";"
-    options = replace(options, decimal_comma=comma, side=side)
+    options = replace(options, decimal_comma=comma)
     in_hand = TableInHand(options, file, sheet.name, out.tell)
     columns = Columns(header, in_hand, is_form=form is not None)
     table = _Table(sheet, header, columns, in_hand, out)
@@ -1013,36 +1011,32 @@ def _read_one(
 
 
 def _sides(
-    sheet: str | None,
-    header: Header,
-    rows: Sequence[NumberedRow],
-    options: ReadOptions,
-    file: str,
-) -> tuple[ReadOptions, Side | None, str]:
+    sheet: str | None, header: Header, rows: Sequence[Cells], options: ReadOptions, file: str
+) -> tuple[ReadOptions, str]:
     """Find the sides of a table without a column of them: in a column of gears that holds nothing
     else, as declared, or in the name of the sheet or the file. What was done is said in words.
     """
-    known = [recognise(text, options.joints).field for text in header.texts]
     mapped = {*options.column_map.values(), *options.shared_map.values()}
-    if SIDE.name in mapped or any(field and field.column is SIDE for field in known):
-        return options, None, ""
-    for index, text in enumerate(header.texts):
-        cells = [row[index] for number, row in rows if number > header.row and index < len(row)]
-        words = [cell for cell in cells if cell is not None]
-        sides = [word for word in words if isinstance(word, str) and Side.spelt(word)]
-        if sides and sides == words and tidy(text) in _GEARS and text not in options.column_map:
+    known = any(recognise(text, options.joints).column is SIDE for text in header.texts)
+    if SIDE.name in mapped or known:
+        return replace(options, side=None), ""
+    for text, cells in zip(header.texts, zip_longest(*rows), strict=False):
+        words = {show(cell) for cell in cells if cell is not None}
+        are_sides = words and all(map(Side.spelt, words))
+        if are_sides and tidy(text) in _GEARS and text not in options.column_map:
             mapping = {**options.column_map, text: SIDE.name}
-            return replace(options, column_map=mapping), None, ""
+            return replace(options, column_map=mapping, side=None), ""
     if options.side is not None:
-        return options, options.side, f"every row is {options.side}"
+        return options, f"every row is {options.side}"
     for name, place in ((sheet or "", "sheet"), (PurePath(file).stem, "file")):
         words_of_side = re.findall(r"(?<![^\W_])[LR]H(?![^\W_])", name)
         whole = Side.spelt(name)
         named = {whole} if whole else set(map(Side.spelt, words_of_side))
         if len(named) == 1:
             (side,) = named
-            return options, side, f"every row is {side}, as the name of the {place} says"
-    return options, None, ""
+            said = f"every row is {side}, as the name of the {place} says"
+            return replace(options, side=side), said
+    return options, ""
 
 
 _STATISTICS = (
@@ -1099,8 +1093,8 @@ class _Table:
         self._of_several = [
             p.index
             for p in columns.placed
-            if sheet.delimiter is None and p.field is not None and not p.field.column.is_length
-            if p.field.column is not RECORD_ID or columns.is_long
+            if sheet.delimiter is None and p.column is not None and not p.column.is_length
+            if p.column is not RECORD_ID or columns.is_long
         ]
         self._above: dict[int, tuple[int, Filled]] = {}
         self._last_rows: dict[tuple[int, int], int] | None = None
@@ -1125,11 +1119,9 @@ class _Table:
             self._is_below_other = True
             return
         texts = [cell for cell in cells if isinstance(cell, str)]
-        fields = {text: recognise(_text(text), self._table.options.joints).field for text in texts}
-        is_told = self._is_below_other or any(
-            field and field.column in (CLEARANCE, PLUNGER_DISPLACEMENT) for field in fields.values()
-        )
-        others = [cell for cell in cells if not isinstance(cell, str) or not fields[cell]]
+        known = {text: recognise(_text(text), self._table.options.joints) for text in texts}
+        is_told = self._is_below_other or any(each.column in _READ for each in known.values())
+        others = [cell for cell in cells if not isinstance(cell, str) or not known[cell].field]
         is_of_gear = any(map(Side.spelt, texts)) and any(map(_is_fraction, cells))
         is_number = is_told and any(map(_is_number, others))
         is_said = any(tells_failure(text) or says_reading(text) for text in texts)
@@ -1233,8 +1225,7 @@ class _Table:
         ]
         if all(recognise(word, joints) is UNKNOWN for word in words):
             return False
-        fields = [recognise(_text(cell), joints).field for cell in cells]
-        names = any(field is not None and field.column in IDENTITY for field in fields)
+        names = any(recognise(_text(cell), joints).column in IDENTITY for cell in cells)
         return names and header_score(cells, self._table.options) > 0
 
     def repeats(self, cells: Cells) -> bool:
