@@ -170,9 +170,11 @@ _REFERENCE = _phrases(
     rf"|(?:{_MOST} )?(?:drawing|dwg|tol|tolerance|spec|specification|allow(?:ed|able)|permitted"
     rf"|permissible)(?: {_MOST})?"
 )
-_SIDE = re.compile(r"\b(?:[lr]/?h|left|right|port|stbd|starboard)\b|^[lr]$")
+_SIDE = re.compile(
+    r"\b(?:[lr]/?h|left|right|port|stbd|starboard)\b(?: hand\b)?(?: side\b| gear\b)?|^[lr]$"
+)
 # A side, or what was left.
-_OPEN = re.compile(r"\bleft\b(?! (?:hand|side|gear|leg))")
+_OPEN = re.compile(r"\bleft\b(?! (?:hand|side|gear))")
 
 
 def take_apart(text: str, beside: str = "") -> Heading:
