@@ -12,7 +12,7 @@ from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear import DEFAULT_GEAR
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import lives
-from mlg_troubleshoot.records.frames import frame_of, label_of
+from mlg_troubleshoot.records.gate import frame_of, label_of
 from mlg_troubleshoot.records.headers import Joints
 from mlg_troubleshoot.store import Store
 from mlg_troubleshoot.workflows.check import CheckResult

@@ -21,7 +21,6 @@ __all__ = [
     "admit",
     "annotate",
     "expand",
-    "frames",
     "gate",
     "headers",
     "judge_again",

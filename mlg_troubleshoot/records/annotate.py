@@ -380,18 +380,13 @@ def _annotate(
         if layout.file != label or layout.sheet not in book.sheetnames:
             continue
         sheet = book[layout.sheet]
-        # The first column behind the table, counted from 1.
-        free = layout.width + 1
         for problem in result.problems:
             if problem.file == label and problem.sheet == layout.sheet:
                 _mark(sheet, layout, problem)
         own = {s: v for s, v in verdicts.items() if s.file == label and s.sheet == layout.sheet}
         if layout.kind != "long":
             _mark_over_limit(sheet, layout, own, over_limit)
-        if layout.kind == "form":
-            _beside_form(sheet, layout, free, own)
-        else:
-            _behind_table(sheet, layout, free, own)
+        _write_results(sheet, layout, own)
 
 
 # Parts that the library may drop in silence, by their folder, as a user calls them.
@@ -486,15 +481,20 @@ def _put(cell: Cell | MergedCell, value: str | float | None) -> None:
             cell.quotePrefix = True
 
 
-def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictColumns) -> None:
-    sheet.row_dimensions[layout.header_row].height = None
+def _write_results(sheet: Worksheet, layout: SheetLayout, own: VerdictColumns) -> None:
+    """Write what was found behind the rows of a table, or line by line beside a form."""
+    is_form = layout.kind == "form"
+    top = layout.header_row
+    # The first column behind the table, counted from 1.
+    free = layout.width + 1
     headers = dict.fromkeys(header for values in own.values() for header in values)
-    for column, header in enumerate(headers, free):
-        cell = sheet.cell(layout.header_row, column)
-        _put(cell, header)
-        cell.font = BOLD
-        _fill(cell, HEADER_FILL)
-        cell.alignment = Alignment(wrap_text=True, vertical="center")
+    for place, header in enumerate(headers):
+        line, column = (top + place, free) if is_form else (top, free + place)
+        label = sheet.cell(line, column)
+        _put(label, header)
+        label.font = BOLD
+        _fill(label, HEADER_FILL)
+        label.alignment = Alignment(wrap_text=True, vertical="center")
         found = {
             s.row: v[header]
             for s, v in own.items()
@@ -503,24 +503,20 @@ def _behind_table(sheet: Worksheet, layout: SheetLayout, free: int, own: Verdict
         longest = max((len(v) for v in found.values() if isinstance(v, str)), default=0)
         is_long = longest >= 2 * _TEXT_WIDTH
         width = _LONG_WIDTH if is_long else _TEXT_WIDTH if longest else _NUMBER_WIDTH
-        sheet.column_dimensions[column_letters(column - 1)].width = width
+        letters = column_letters(column - 1)
+        sheet.column_dimensions[letters].width = _TEXT_WIDTH if is_form else width
         for row, value in found.items():
-            written = sheet.cell(row, column)
+            at = line if is_form else row
+            written = sheet.cell(at, column + is_form)
             _put(written, value)
             written.number_format = "General" if isinstance(value, str) else "0.0000"
             written.alignment = Alignment(wrap_text=is_long)
-            if is_long and sheet.row_dimensions[row].height is None:
-                sheet.row_dimensions[row].height = 15.0 * -(-len(str(value)) // _ON_A_LINE)
+            if is_long and sheet.row_dimensions[at].height is None:
+                sheet.row_dimensions[at].height = 15.0 * -(-len(str(value)) // _ON_A_LINE)
             if header == "verdict":
                 _fill(written, _VERDICT_FILLS.get(str(value), _UNDECIDED_FILL))
-    longest = max(map(len, headers), default=0)
-    sheet.row_dimensions[layout.header_row].height = 15.0 * -(-longest // (_NUMBER_WIDTH - 2))
-
-
-def _beside_form(sheet: Worksheet, layout: SheetLayout, free: int, own: VerdictColumns) -> None:
-    for values in own.values():
-        for offset, (header, value) in enumerate(values.items()):
-            label = sheet.cell(layout.header_row + offset, free)
-            _put(label, header)
-            label.font = BOLD
-            _put(sheet.cell(layout.header_row + offset, free + 1), value)
+    if is_form:
+        sheet.column_dimensions[column_letters(free)].width = _LONG_WIDTH
+    else:
+        longest = max(map(len, headers), default=0)
+        sheet.row_dimensions[top].height = 15.0 * -(-longest // (_NUMBER_WIDTH - 2))

@@ -35,7 +35,7 @@ from mlg_troubleshoot.records.cells import (
     writable,
 )
 from mlg_troubleshoot.records.csvfile import csv_book
-from mlg_troubleshoot.records.frames import FRAME, FrameSheet, as_frame, in_frame, is_frame
+from mlg_troubleshoot.records.gate import FRAME, FrameSheet, as_frame, in_frame, is_frame
 from mlg_troubleshoot.records.rows import FileRead, ReadOptions, ReadResult, SheetLayout
 from mlg_troubleshoot.records.tables import (
     Collected,
@@ -50,7 +50,7 @@ from mlg_troubleshoot.records.tables import (
 from mlg_troubleshoot.records.values import says_reading
 
 if TYPE_CHECKING:
-    from mlg_troubleshoot.records.frames import Frame
+    from mlg_troubleshoot.records.gate import Frame
 
     Source = str | Path | BinaryIO | Frame
 

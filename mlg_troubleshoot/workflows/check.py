@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from mlg_troubleshoot.life.folding import GearLife
     from mlg_troubleshoot.life.logbook import AsFoundAsLeft
     from mlg_troubleshoot.records import ReadResult
-    from mlg_troubleshoot.records.frames import Frame
+    from mlg_troubleshoot.records.gate import Frame
     from mlg_troubleshoot.records.read import Source
     from mlg_troubleshoot.reporting.html import Witness
     from mlg_troubleshoot.reporting.publish import WrittenReport
@@ -396,7 +396,7 @@ def _has_columns(clearance_in: object) -> bool:
 def _clearances_of(table: Frame, gear: Gear, **declared: Any) -> Array:
     """Radial clearances of the rows of a frame, shape (n, n_joints), 0 where blank. [in]"""
     from mlg_troubleshoot.records import ReadOptions, read_many
-    from mlg_troubleshoot.records.frames import clearances_alone
+    from mlg_troubleshoot.records.gate import clearances_alone
 
     declared = {"convention": ClearanceConvention.RADIAL, "small_readings_true": True, **declared}
     options = ReadOptions.of(gear, CheckOptions(**declared))
@@ -433,7 +433,7 @@ def read_inspections(
         hold the ``problems``, a tuple, and the ``notes``.
     """
     from mlg_troubleshoot.records import ReadOptions, read_many
-    from mlg_troubleshoot.records.frames import frame_of
+    from mlg_troubleshoot.records.gate import frame_of
 
     options = ReadOptions.of(load_gear(gear), CheckOptions(**declared))
     read = read_many([source], options)
