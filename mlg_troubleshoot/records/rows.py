@@ -79,6 +79,7 @@ from mlg_troubleshoot.records.headers import (
     tidy,
 )
 from mlg_troubleshoot.records.values import (
+    NO_NAME,
     NOT_MEASURED,
     CellFaultError,
     DateOrder,
@@ -86,7 +87,6 @@ from mlg_troubleshoot.records.values import (
     convention_word,
     days_of,
     find_day,
-    is_no_name,
     may_be_outcome,
     read_date,
     read_joints,
@@ -173,8 +173,8 @@ _REFERENCE = _phrases(
 _SIDE = re.compile(
     r"\b(?:[lr]/?h|left|right|port|stbd|starboard)\b(?: hand\b)?(?: side\b| gear\b)?|^[lr]$"
 )
-# A side, or what was left.
-_OPEN = re.compile(r"\bleft\b(?! (?:hand|side|gear))")
+# A side, or what was left; not what remains of a life or a margin.
+_OPEN = re.compile(r"(?<!landings )(?<!cycles )(?<!margin )\bleft\b(?! (?:hand|side|gear))")
 
 
 def take_apart(text: str, beside: str = "") -> Heading:
@@ -712,8 +712,12 @@ _NO_END = "Measure with a gauge that reaches further, or leave it blank if it wa
 
 @lru_cache(4096)
 def _tells_failure(header: str, cell: Filled) -> bool:
-    """Whether a cell says that the gear failed, or answers whether it did."""
+    """Whether a cell says that the gear failed, or answers whether it did; one word with a digit
+    is a code.
+    """
     text = cell if isinstance(cell, str) else ""
+    if _CODE.fullmatch(text):
+        return False
     # The rows of a long table are carried together.
     return any(map(says_failed, text.split("; "))) or answers_outcome(header, cell)
 
@@ -783,22 +787,19 @@ class Row:
 
 @dataclass(slots=True)
 class _Found:
-    """What the cells of one row say; lengths as entered and what each is in inches."""
+    """What the cells of one row say; lengths as entered and what each is in inches.
+
+    scale: without its convention a reading is checked as the largest radial value that it may be.
+    """
 
     convention: ClearanceConvention | None
+    scale: ClearanceConvention
     values: dict[Column, Any] = field(default_factory=dict)
     carried: dict[str, str] = field(default_factory=dict)
     lengths: dict[Column, dict[int, float]] = field(default_factory=dict)
     entered: dict[int, EnteredClearance] = field(default_factory=dict)
     plunger: list[tuple[float, LengthUnit]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-
-    @property
-    def scale(self) -> ClearanceConvention:
-        """Without its convention a reading is checked as the largest radial value that it may
-        be.
-        """
-        return self.convention or ClearanceConvention.TOTAL_PLAY
 
 
 class RowReader:
@@ -877,7 +878,8 @@ class RowReader:
     def read(self, row: Row) -> Inspection | InvalidRow:
         """Read one row; every bad cell is reported once."""
         self._begin(row)
-        found = _Found(self._read_convention())
+        convention = self._read_convention()
+        found = _Found(convention, convention or ClearanceConvention.TOTAL_PLAY)
         self._read_lengths(found, self._read_row_unit())
         self._read_others(found)
         for index, name in self._unread.items():
@@ -1021,8 +1023,10 @@ class RowReader:
 
     def _one_value(self, index: int, column: Column, cell: Cell) -> Any:
         """Read a cell that holds no length."""
+        name = cell if column is TAIL_NO and isinstance(cell, str) else "0"
         # Gears that nobody can name are not one gear.
-        if cell is None or (column is TAIL_NO and is_no_name(cell)):
+        is_named = any(map(str.isalnum, name)) and plain_text(name).casefold() not in NO_NAME
+        if cell is None or not is_named:
             remedy = "Enter it; a row without it cannot be used."
             if column.choices is not None:
                 remedy = f"Enter {column.asked}; it has no default."
@@ -1088,7 +1092,7 @@ class RowReader:
         """
         asked = []
         of_joint = found is None
-        found = found or _Found(None)
+        found = found or _Found(None, ClearanceConvention.TOTAL_PLAY)
         outcome = found.values.get(OUTCOME)
         units = {entered.unit for entered in found.entered.values()}
         for place, (placed, nearest, is_sure) in enumerate(self._unread_words):

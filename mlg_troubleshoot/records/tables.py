@@ -125,23 +125,15 @@ def _names(key: str, text: str, letters: str) -> bool:
     return tidy(key) == tidy(text) or key == letters
 
 
-def mapped_to(options: ReadOptions, text: str, letters: str = "") -> str | None:
-    """What the caller reads a header as; None if it is not mapped."""
-    named = options.column_map
-    for key, target in (*named.items(), *options.shared_map.items()):
-        # Letters name a place in one table, not in several.
-        if _names(key, text, letters if key in named else ""):
-            return target
-    return None
-
-
 def _understood(text: str, letters: str, options: ReadOptions) -> tuple[Recognition, bool]:
     """What a header is understood as, and whether the caller said so."""
-    target = mapped_to(options, text, letters)
-    if target is None:
-        return recognise(text, options.joints), False
-    named = None if tidy(target) == "carry" else parse_target(target, options.joints, "--map")
-    return Recognition(named), True
+    for key, target in (*options.column_map.items(), *options.shared_map.items()):
+        # Letters name a place in one table, not in several.
+        if _names(key, text, letters if key in options.column_map else ""):
+            is_carried = tidy(target) == "carry"
+            named = None if is_carried else parse_target(target, options.joints, "--map")
+            return Recognition(named), True
+    return recognise(text, options.joints), False
 
 
 def header_score(cells: Cells, options: ReadOptions) -> int:

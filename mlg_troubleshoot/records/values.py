@@ -194,7 +194,7 @@ _BLANK_WORDS = (
 NOT_MEASURED = frozenset(_BLANK_WORDS.split("|"))
 # What they write for a tail that they do not know; NA and NONE may be tails.
 _NO_NAME_WORDS = "n/a|n.a.|unknown|not known|tbd|tba|ditto|do.|do|idem|id.|same|as above"
-_NO_NAME = frozenset(_NO_NAME_WORDS.split("|"))
+NO_NAME = frozenset(_NO_NAME_WORDS.split("|"))
 
 
 def odd_cell_fault(cell: OddCell, expected: str) -> CellFaultError:
@@ -372,14 +372,6 @@ def _number(
     if not _PLAIN.fullmatch(body) or vanishes(body, float(body)):
         raise CellFaultError("not_a_number", expected)
     return float(body), None
-
-
-def is_no_name(cell: Filled) -> bool:
-    """Whether a cell says that a name is not known."""
-    if not isinstance(cell, str):
-        return False
-    said = plain_text(cell).casefold()
-    return said in _NO_NAME or not any(character.isalnum() for character in said)
 
 
 def read_text(cell: Filled, expected: str, *, required: bool = False) -> str:

@@ -292,3 +292,10 @@ def test_left_is_a_side_or_what_was_left_as_the_headings_next_to_it_say(
     found = read_many([workbook(rows)], OPTIONS)
     assert found_in(found) == visits
     assert bool(found.problems) is not bool(visits)
+
+
+@pytest.mark.parametrize(("header", "value"), [("Landings left", 50), ("Margin left (in)", 0.9)])
+def test_what_remains_is_not_what_was_left(header: str, value: float) -> None:
+    rows = [["Tail", "Convention", "Side", "J3 found (in)", "J3 left (in)", header]]
+    found = read_many([workbook([*rows, ["N1", "RADIAL", "LH", 0.001, 0.002, value]])], OPTIONS)
+    assert [(row.gear_landings, row.margin_in) for row in found.inspections] == [(None, None)] * 2
