@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from datetime import date, datetime
 from enum import StrEnum
 from numbers import Real
+from typing import NamedTuple
 
 from mlg_troubleshoot.errors import Problem
 
@@ -143,8 +144,7 @@ _UNIT_MARKS = frozenset("\"'°″′”’%‰")
 _PERCENT, _SCIENTIFIC = "%", "E+"
 
 
-@dataclass(frozen=True, slots=True)
-class NumberFormat:
+class NumberFormat(NamedTuple):
     """What a number format makes of a number.
 
     sections: text of each section, with a mark where the number stands.

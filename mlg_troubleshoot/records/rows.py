@@ -23,7 +23,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import date, timedelta
 from enum import IntEnum
-from functools import cache, lru_cache
+from functools import lru_cache
 from operator import itemgetter
 from pathlib import PurePath
 from typing import Any, NamedTuple
@@ -390,8 +390,7 @@ class TableInHand:
         self.tell(fault.code, found, fault.expected, fault.remedy, place)
 
 
-@dataclass(frozen=True, slots=True)
-class SheetLayout:
+class SheetLayout(NamedTuple):
     """Where the parts of a table were found, and how its columns were read.
 
     header_row: the lower row of the header, counted from 1, or the one by which a form is called.
@@ -413,8 +412,7 @@ class SheetLayout:
         return None
 
 
-@dataclass(frozen=True, slots=True)
-class FileRead:
+class FileRead(NamedTuple):
     """One file as read; a DataFrame has the labels of its rows, whatever they are."""
 
     name: str
@@ -487,8 +485,7 @@ class UnitFit(IntEnum):
     TOO_SMALL = 3
 
 
-@dataclass(frozen=True, slots=True)
-class RowUnit:
+class RowUnit(NamedTuple):
     """How the readings of a row fit their unit, the joints whose readings do not, and what to ask
     about them.
     """
@@ -585,7 +582,6 @@ def plunger_question(displacement_in: float, stated: LengthUnit, options: ReadOp
     )
 
 
-@cache
 def _larger(stated: LengthUnit) -> list[LengthUnit]:
     return [unit for unit in LengthUnit if unit.per_inch < stated.per_inch]
 
@@ -692,7 +688,6 @@ _FIELDS = frozenset(each.name for each in fields(Inspection))
 # What no word of an outcome, a convention or a unit is: one with a digit, such as a work order.
 _CODE = re.compile(r"(?=..)\S*\d\S*")
 _MONTHS = 12
-_A_DAY = timedelta(days=1)
 _MADE_FROM_A_ROW = re.compile(r"-\d+-[0-9a-f]{8}\Z")
 
 
@@ -845,7 +840,7 @@ class RowReader:
         self.not_measured: Counter[str] = Counter()
         self._without_unit: set[str | None] = set()
         # Somewhere it is tomorrow already.
-        self._latest = min(date.today(), date.max - _A_DAY) + _A_DAY
+        self._latest = date.today() + timedelta(days=1)
         self._day_of = lru_cache(self._read_day_of_visit)
         # The dates of the column, and those of rows that wait for the others.
         self._days: set[Cell] = set()
