@@ -428,15 +428,6 @@ def _has_dropped(readings: Sequence[tuple[float, float, float]]) -> bool:
     return below >= _DROP * float(np.hypot(u[-1], np.linalg.norm(weights * u[:-1])))
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """What is asked of a fleet: since when (ISO 8601), and the readings of which joint."""
-
-    gear: Gear
-    since: str = ""
-    joint: int | None = None
-
-
 class Reading(NamedTuple):
     """A reading of one joint. [in]"""
 
@@ -482,9 +473,11 @@ class FleetLine:
     unit: LengthUnit | None
 
     @classmethod
-    def of(cls, life: GearLife, asked: Asked, ahead: Forecast) -> FleetLine:
-        gear = asked.gear
-        lines = log_of(life, gear, () if asked.joint is None else (asked.joint,))
+    def of(
+        cls, life: GearLife, ahead: Forecast, gear: Gear, since: str = "", joint: int | None = None
+    ) -> FleetLine:
+        """`since`: a day (ISO 8601); `joint`: whose readings are listed."""
+        lines = log_of(life, gear, () if joint is None else (joint,))
         failed = [e.date or "no date" for e in lines if e.counts and e.kind == "FAILED"]
         row = None if life.latest is None else life.latest.inspection
         newest_first = (each.inspection.unit_entered for each in reversed(life.inspections))
@@ -499,14 +492,14 @@ class FleetLine:
             None if row is None else row.inspection_date,
             None if row is None else row.gear_landings,
             urgency_of(life, lines, gear),
-            tuple(day for day in failed if day >= asked.since),
+            tuple(day for day in failed if day >= since),
             repair_sentence(lines),
             suggestion(life, gear),
-            changes_since(life, lines, asked.since) if asked.since else (),
+            changes_since(life, lines, since) if since else (),
             tuple(
                 Reading(e.date, e.gear_landings, e.value_in or 0.0)
                 for e in lines
-                if e.counts and e.kind == "reading" and e.joints == (asked.joint,)
+                if e.counts and e.kind == "reading" and e.joints == (joint,)
             ),
             next(filter(None, newest_first), None),
         )

@@ -76,7 +76,7 @@ def as_found_as_left(lines: Iterable[LogLine]) -> list[AsFoundAsLeft]:
         if Outcome.RETRACTED.value in between or Outcome.FAILED.value not in between:
             break
         first = before
-    found, left = _newest(known[:first]), _newest(known[first:])
+    found, left = newest_values(known[:first]), newest_values(known[first:])
     restored: set[int] = set()
     for line in known[first:]:
         if _is_repair(line):
@@ -106,12 +106,7 @@ def _value(line: LogLine) -> str:
     return line.text.partition(" ")[2]
 
 
-def value_of(lines: Iterable[LogLine], what: str) -> str | None:
-    """What was last said of the ``outcome`` or the ``plunger``."""
-    return _newest(lines).get(what)
-
-
-def _newest(lines: Iterable[LogLine]) -> dict[str | int, str]:
+def newest_values(lines: Iterable[LogLine]) -> dict[str | int, str]:
     """What was last said of the outcome, the plunger and each joint."""
     found: dict[str | int, str] = {}
     for line in lines:

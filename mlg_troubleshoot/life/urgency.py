@@ -10,7 +10,7 @@ from mlg_troubleshoot.decision.inspection import FactKind, Outcome
 from mlg_troubleshoot.decision.sentences import joint_list
 from mlg_troubleshoot.gear.gear import ROUNDING_IN, Gear
 from mlg_troubleshoot.life.folding import GearLife
-from mlg_troubleshoot.life.logbook import LogLine, value_of
+from mlg_troubleshoot.life.logbook import LogLine, newest_values
 from mlg_troubleshoot.units import Length, Sentence
 
 # From the most urgent: failed again after a repair, measured outside, failed, over a limit, could
@@ -122,7 +122,7 @@ def repair_sentence(lines: Sequence[LogLine]) -> str:
     before, after = known[:last], known[last + 1 :]
     done = known[last]
     parts = []
-    was, now = value_of(before, "plunger"), value_of(after, "plunger")
+    was, now = (newest_values(each).get("plunger") for each in (before, after))
     if now:
         parts.append(Sentence.of("plunger {} → {}", was or "not read", now))
     worst_was, worst_now = _worst_in(before), _worst_in(after)

@@ -303,6 +303,11 @@ class Record:
         return f"record {self.seq} ({self.kind} {self.record_id!r}, hash {self.digest[:10]})"
 
     @property
+    def visit(self) -> str:
+        """Id, gear and day, for messages."""
+        return f"{self.record_id} ({self.tail_no} {self.side} {self.day or 'no date'})"
+
+    @property
     def identity_hash(self) -> bytes:
         """Hash of the identity, or of the whole content without one."""
         what = self.identity or (
@@ -411,9 +416,7 @@ def files_of(place: str | Path | None) -> tuple[Path, ...]:
 
 def kept_otherwise(records: Sequence[Record]) -> StoreError:
     """Refuse what stands already with other content."""
-    named = ", ".join(
-        f"{r.record_id} ({r.tail_no} {r.side} {r.day or 'no date'})" for r in records[:5]
-    )
+    named = ", ".join(record.visit for record in records[:5])
     more = f" and {len(records) - 5} more" if len(records) > 5 else ""
     return StoreError(
         f"kept already with other content: {named}{more}; nothing of this was kept",

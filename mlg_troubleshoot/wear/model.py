@@ -373,9 +373,6 @@ _LEARN_FROM_OTHERS = 40
 # Standard deviation of the pace of wear beyond the usage that any unit has reached: no reading so
 # far can show a curve that bends later. [1]
 _DOUBT = 0.25
-# Usages at which a path is asked whether it has passed a limit, from the last reading on, per usage
-# that any unit has reached. [1]
-_TO_LIMIT = np.concatenate([[0], np.geomspace(1 / 50, 40, 44)])
 # The clock of a simulated path never stops. [1]
 _SLOWEST = 0.1
 
@@ -483,26 +480,6 @@ class WearModel(Result):
         if isinstance(unit, str):
             return Samples(parts[0][0])
         return Samples(parts[0] if len(parts) == 1 else np.concatenate(parts))
-
-    def usage_to_limit(self, unit: str | Sequence[str], limit: ArrayLike) -> Samples:
-        """Forecast the usage at which the wear itself of one unit or n, not a reading of it,
-        crosses a limit, along simulated paths.
-
-        limit, one for all or shape (n,): the limit. [value] Returns samples of shape (n_samples,)
-        or (n, n_samples): usage since the last restoration at the crossing,
-          infinite where there never is one; at the last reading where the limit is passed already.
-          [usage]
-        """
-        units = [unit] if isinstance(unit, str) else list(unit)
-        limits = np.broadcast_to(limit, (len(units),))
-        last = self._last(units)[:, None] * self.scale.usage
-        ahead = self.scale.usage * _TO_LIMIT
-        wear = self.forecast(units, last + ahead, reading=False).samples
-        # Wear that falls passes its limit from above.
-        up = np.sign(self.scale.value)
-        wear *= up
-        samples = last + first_passage(ahead, wear, up * limits)
-        return Samples(samples[0] if isinstance(unit, str) else samples)
 
     def _chunks(self, units: int, together: int) -> Iterator[Places]:
         """Units that are worked out at once: whole groups of those asked about together."""

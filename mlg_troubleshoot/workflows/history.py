@@ -32,7 +32,6 @@ from mlg_troubleshoot.life.folding import (
     lives_of,
 )
 from mlg_troubleshoot.life.forecast import (
-    Asked,
     FleetLine,
     most_urgent_first,
     parts_within,
@@ -169,7 +168,6 @@ def show_fleet(
     from mlg_troubleshoot.life.forecast import expected_of, forecast
 
     progress("Reading the store", 0, None)
-    asked = Asked(gear, since, joint)
     keys = store.gears()
     table = load_index_table(gear)
     model = _taught(store, gear, keys, progress) if ahead else None
@@ -184,7 +182,7 @@ def show_fleet(
         part = lives_of(store, keys[first : first + _AT_ONCE]).values()
         judged = judge_lives(part, gear, table, fleet=fleet, every=whole or bool(since))
         forecasts = forecast(judged, model, gear)
-        lines += [FleetLine.of(life, asked, forecasts[life.key]) for life in judged]
+        lines += [FleetLine.of(life, forecasts[life.key], gear, since, joint) for life in judged]
         found += judged if whole else ()
     progress(doing, len(keys), len(keys))
     return Lives(gear, tuple(found), tuple(lines), model)

@@ -127,11 +127,6 @@ class Told:
         return self.record.tail_no, self.record.side
 
     @property
-    def named(self) -> str:
-        record = self.record
-        return f"{record.record_id} ({record.tail_no} {record.side} {record.day or 'no date'})"
-
-    @property
     def known_by(self) -> Iterator[Hashable]:
         """What another record of the same inspection has as well."""
         name, day = self.record.record_id, self.record.day
@@ -299,7 +294,7 @@ def _vanished(store: Store, made: Sequence[Told], stand: Collection[str]) -> lis
     every = in_turn(store, store.gears()) if files else ()
     kept = (Told.of(visit.kept) for life in every if life for visit in life.inspections)
     gone = [
-        each.named
+        each.record.visit
         for each in kept
         if each.file in files and each.record.key not in stand and each.content not in contents
     ]
@@ -331,7 +326,7 @@ def _difference(kept: Told, new: Told) -> str:
         for what in dict.fromkeys((*was, *says))
         if was.get(what) != says.get(what)
     ]
-    return ": ".join(filter(None, (kept.named, ", ".join(cells))))
+    return ": ".join(filter(None, (kept.record.visit, ", ".join(cells))))
 
 
 def _free_id(made: str, used: Collection[str]) -> str:

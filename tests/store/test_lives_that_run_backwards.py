@@ -18,7 +18,6 @@ from mlg_troubleshoot.decision.inspection import Inspection, Side
 from mlg_troubleshoot.gear.gear_file import load_gear
 from mlg_troubleshoot.life.folding import judge_lives, life_of, lives
 from mlg_troubleshoot.life.forecast import (
-    Asked,
     FleetLine,
     LifeAhead,
     fit_fleet,
@@ -438,7 +437,7 @@ def test_a_gear_that_is_due_now_shows_no_landings_left_in_60_lives() -> None:
     found = judge_lives(lives(Store()).values(), gear, load_index_table(gear))
     model = fit_fleet(found[:5], gear)
     ahead = forecast(found, model, gear)
-    lines = [FleetLine.of(life, Asked(gear), ahead[life.key]) for life in found]
+    lines = [FleetLine.of(life, ahead[life.key], gear) for life in found]
     fleet = Lives(gear, (), tuple(lines), model).to_dict()["gears"]
     pages = [
         LifeAhead(life, forecast([life], model, gear)[life.key], gear).to_dict() for life in found
