@@ -186,8 +186,7 @@ class Run:
         outputs = [task.BlockOutput(listed, found.lines.extend)]
         if wanted.as_json and total > 1:
             begin, found.end = task.json_around(read)
-            output.write_pieces((begin,))
-            joint = chain(("",), repeat(",\n"))
+            joint = chain((begin,), repeat(",\n"))
             outputs.append(
                 task.BlockOutput(
                     task.json_lines,

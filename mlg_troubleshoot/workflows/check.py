@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mlg_troubleshoot.decision.assessment import Action, Assessment, Judgement, Verdict
-from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, RowSource
+from mlg_troubleshoot.decision.inspection import Inspection, InvalidRow, Outcome, RowSource
 from mlg_troubleshoot.decision.judge_rows import (
     AT_ONCE,
     Listed,
@@ -240,7 +240,7 @@ def check_files(
     Raises
     ------
     UsageError
-        If a mapped column does not exist.
+        If a mapped column does not exist, or more gears failed than there is time to plan.
     """
     from mlg_troubleshoot.records import ReadOptions, read_many
 
@@ -464,6 +464,11 @@ def _judge(
     total = len(rows)
     if counting is None:
         counting = _states(rows, found.gear, store, typed=found.read is None)
+    planned = sum(
+        state.inspection.is_repaired or state.inspection.outcome is Outcome.FAILED
+        for state in counting
+        if state is not None
+    )
     if total > 1:
         notes = *found.notes, *_warned(rows), *other_visits_count(counting)
         found = replace(found, notes=notes)
@@ -492,6 +497,14 @@ def _judge(
     wanted = (
         [BlockOutput(tuple, held.extend, sets=True)] if outputs is None else outputs(found, total)
     )
+    sets = any(output.sets for output in wanted)
+    most = _MOST_PLANNED[sets]
+    if planned > most and options.executor is None:
+        raise UsageError(
+            f"{planned} gears that failed or were repaired: at most {most} are planned at once"
+            f"{' with what follows NEXT' if sets else ''}; nothing was judged",
+            f"Give a part of the table{'; --csv alone takes more' if sets else ''}.",
+        )
     task = partial(
         _made,
         partial(
@@ -499,7 +512,7 @@ def _judge(
             gear=found.gear,
             table=load_index_table(found.gear),
             advice=total == 1 if options.advice is None else options.advice,
-            sets=any(output.sets for output in wanted),
+            sets=sets,
             extension=options.extension,
             fleet=fleet,
         ),
@@ -776,6 +789,9 @@ def write_template(
     )
 
 
+# Gears that failed or were repaired, without and with what follows NEXT: their plans take 20 s on
+# two cores. [1]
+_MOST_PLANNED = (16_000, 6_000)
 # Wrong cells that an error names at most.
 _MOST_SAID = 20
 # Rows with warnings that are named. [1]

@@ -217,3 +217,17 @@ def test_reports_of_a_table_that_is_too_long_are_refused_before_it_is_judged(tmp
     assert (run.code, run.out) == (2, "")
     assert "--report of 46 inspections" in run.err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("most", "option", "code"), [((99, 1), "--json", 2), ((99, 1), "--csv", 1)]
+)
+def test_more_failed_gears_than_there_is_time_to_plan_are_refused(
+    tmp_path, monkeypatch, most, option, code
+):
+    monkeypatch.setattr("mlg_troubleshoot.workflows.check._MOST_PLANNED", most)
+    run = mlg("check", FLEET, option, *([tmp_path / "out.csv"] if option == "--csv" else ()))
+    assert run.code == code
+    refused = "at most 1 are planned at once with what follows NEXT; nothing was judged"
+    assert (refused in run.err) == (code == 2)
+    assert not run.out or code == 1
