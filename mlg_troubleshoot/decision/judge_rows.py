@@ -595,7 +595,9 @@ def _warnings(
             )
         )
     if plunger_reading.readings_differ(inspection):
-        warnings.append("The plunger readings differ: the farthest counts. Read the plunger again.")
+        warnings.append(
+            "The plunger readings differ: the farthest counts. Void one that was a slip."
+        )
     if inspection.is_repaired:
         over = [f.joint for f in findings if f.over_limit]
         warnings += sentences.older_than_the_repair(inspection, over)

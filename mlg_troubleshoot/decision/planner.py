@@ -47,6 +47,7 @@ from mlg_troubleshoot.decision.prediction import (
     Prediction,
     ensemble,
     model_uncertainty,
+    readings_differ,
     responses,
 )
 from mlg_troubleshoot.decision.priors import BEYOND, PRIORS, THRESHOLDS, WELL_WITHIN
@@ -386,7 +387,9 @@ class _PlanBuilder:
             self.over and self.judged.bases[i] is Basis.MEASURED
         ):
             return self._done()
-        if not self.read_plunger or self.over or self.inspection.is_plunger_in_doubt:
+        if self.beyond and self._are_at_odds():
+            self._read_the_plunger(again=True)
+        elif not self.read_plunger or self.over or self._in_doubt():
             minutes = self.gear.plunger_reading.value
             text = sentences.read_to_clear(minutes)
             self._step(Action.READ_PLUNGER, minutes, text, required=False)
@@ -407,15 +410,25 @@ class _PlanBuilder:
         return self._retract()
 
     def _again(self) -> bool:
-        """Whether the plunger is read again: read only once and at the edge of its margin, or
-        perhaps before the repair.
+        """Whether the plunger is read again: read only once and at the edge of its margin, or in
+        doubt.
         """
         cases = self.cases
         i = self.row
         u = np.hypot(cases.plunger_u_in[i], cases.margin_u_in[i])
         at_edge = abs(abs(self.plunger_in) - cases.margin_in[i]) < THRESHOLDS.doubtful * u
         once = len(self.inspection.standing_readings_in) < 2
-        return bool(at_edge and once) or self.inspection.is_plunger_in_doubt
+        return bool(at_edge and once) or self._in_doubt()
+
+    def _in_doubt(self) -> bool:
+        """Whether the plunger was perhaps read before the repair, or its readings are at odds."""
+        return self.inspection.is_plunger_in_doubt or self._are_at_odds()
+
+    def _are_at_odds(self) -> bool:
+        """Whether two readings of the plunger differ by more than their uncertainty: a third shows
+        which of them was a slip.
+        """
+        return len(self.inspection.standing_readings_in) == 2 and readings_differ(self.inspection)
 
     def _failed(self) -> Plan:
         """A gear that failed: the plunger first, then what has the fewest expected minutes."""
