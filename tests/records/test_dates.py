@@ -174,7 +174,8 @@ def test_a_reading_is_written_with_its_end_and_its_unit_once(gear: Gear) -> None
 
 
 def test_a_warning_states_the_unit_of_a_reading_once(gear: Gear) -> None:
-    assert any("joint 3: 0.016in radial is above" in w for w in inspection(gear, "0.016in").warnings)
+    warnings = inspection(gear, "0.016in").warnings
+    assert any("joint 3: 0.016in radial is above" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("cell", [">0.0075", ">0.012", "> .012 in", "≥0.012", "go 0.012"])
