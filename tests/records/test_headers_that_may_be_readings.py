@@ -187,6 +187,7 @@ UNKNOWN = ("プランジャ", "stantuffo", "check", "x", "P")
         *pairs(JOINTS, ["0.0121", "0.0121 in", "12.1 thou", "0.31"]),
         *pairs(MARGINS, ["0.005", "5 thou", "0.12 mm"]),
         *pairs(UNKNOWN, ["0.06 in", "60 thou", '.06"', "1.5 mm"]),
+        ("locking pin", "17"),
     ],
 )
 def test_a_number_that_may_be_of_plunger_joint_or_margin_is_asked_about(header, value):
