@@ -250,15 +250,18 @@ def test_clearance_of_the_pin_in_a_yoke_moves_the_yoke_by_as_much(tmp_path: Path
     assert (worst.over_in[0], worst.under_in[0]) == pytest.approx((0.005, -0.005))
 
 
-def test_a_slider_on_a_link_keeps_its_distance_from_the_link_and_its_rod(tmp_path: Path) -> None:
-    kernel = gear_of(changed(**SLIDING_ROD), tmp_path).model.kernel
+@pytest.mark.parametrize("end", [[-2.0, 4.0], [0.3, 2.0]])
+def test_a_slider_on_a_link_keeps_its_distance_from_the_link_and_its_rod(end, tmp_path):
+    form = SLIDING_ROD | {"ground": {**FOUR_BAR["ground"], "E": end}}
+    kernel = gear_of(changed(**form), tmp_path).model.kernel
     rods, distances = [], []
     for turned in (-0.2, 0.0, 0.1):
         found = kernel.positions(turned, kernel.no_clearance())
         a, b, c = (complex(*map(float, found[name])) for name in "ABC")
-        rods.append(abs(c - complex(-2.0, 4.0)))
+        rods.append(abs(c - complex(*end)))
         distances.append(((c - a) * (b - a).conjugate()).imag / abs(b - a))
-    assert rods == pytest.approx([abs(complex(3.2, -1.0))] * 3)
+        assert turned or c == pytest.approx(complex(1.2, 3.0))
+    assert rods == pytest.approx([rods[1]] * 3)
     assert distances == pytest.approx([distances[1]] * 3)
 
 
