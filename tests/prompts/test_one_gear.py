@@ -246,10 +246,12 @@ def test_a_plunger_that_was_not_read_is_taken_out_and_said(sit, life, line) -> N
 
 @pytest.mark.parametrize("again", ["u", "n"])
 def test_undo_at_a_doubt_takes_the_doubted_answer_back_and_no_good_one(sit, life, again) -> None:
-    terminal = sit(*gear("f", "46", "8", "85", again, "9", "p 460", again, "done"), "")
+    doubted = ("85", "landings 4000", again, "9", "p 460", again)
+    terminal = sit(*gear("f", "46", "8", *doubted, "done"), "")
     assert "– undone: #5 85" in terminal.screen
     found = life().inspections[-1].inspection
     assert (found.clearance_in, found.readings_in) == ({3: 0.004, 5: 0.0045}, (0.046,))
+    assert found.gear_landings == 4000
 
 
 @pytest.mark.parametrize("line", ["p 44", "f p 44", "#4 3 p 44", "landings 4000 p 44"])
