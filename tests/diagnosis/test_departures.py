@@ -505,6 +505,8 @@ def test_a_sure_cause_is_named_although_what_acts_beside_it_cannot_be_told() -> 
     beside = {c.candidate.cause.name for c in d.beside}
     assert (beside, d.also_possible) == ({"calibration_rate", "load_directions"}, ())
     assert not {c.candidate.key for c in d.beside} & set(d.ruled_out)
+    (rival,) = (c for c in d.beside if c.candidate.cause.name == "load_directions")
+    assert (rival.value, rival.interval) == (0.0, (0.0, 0.0))
 
 
 def test_a_sure_cause_is_fitted_with_what_acts_beside_it() -> None:
