@@ -261,7 +261,7 @@ class _Screen:
             return None
         near = self.near(place, self.misfit_of(place, meant[kept]))
         weighed = likely[kept] + np.where(known[kept], near, 0.0)
-        if log_sum(weighed) - as_written < Beliefs().odds:
+        if np.logaddexp.reduce(weighed) - as_written < Beliefs().odds:
             return None
         best = kept[np.argmax(weighed)]
         return kinds[best], meant[best]
