@@ -218,8 +218,7 @@ class Run:
                 " --convention.",
             )
 
-        if self._place is None:
-            raise TypeError("the prompts keep what they find")
+        assert self._place is not None
         from mlg_troubleshoot.cli.prompts.sitting import Sitting
 
         return Sitting(self, self._place).hold(self._flags.tail)

@@ -84,7 +84,13 @@ def as_found_as_left(lines: Iterable[LogLine]) -> list[AsFoundAsLeft]:
         elif line.kind == "reading" and line.joints[0] not in restored:
             found.setdefault(line.joints[0], _value(line))
     joints = {n for each in (found, left) for n in each if isinstance(n, int)}
+    done = [
+        f"{line.text} on {line.date}" if line.date else line.text
+        for line in known[first:]
+        if _is_repair(line) or line.kind == "signed_off"
+    ]
     return [
+        ("Repair", "", "; ".join(done)),
         ("Outcome", found.get("outcome", "not tried"), left.get("outcome", "not tried")),
         ("Plunger", found.get("plunger", "not read"), left.get("plunger", "not read")),
         *(
@@ -107,11 +113,15 @@ def _value(line: LogLine) -> str:
 
 
 def newest_values(lines: Iterable[LogLine]) -> dict[str | int, str]:
-    """What was last said of the outcome, the plunger and each joint."""
+    """What was last said of the outcome and the plunger, and on its last day of each joint."""
     found: dict[str | int, str] = {}
+    days: dict[int, str | None] = {}
     for line in lines:
         if line.kind == "reading":
-            found[line.joints[0]] = _value(line)
+            joint = line.joints[0]
+            same_day = [found[joint]] if joint in found and days[joint] == line.date else []
+            found[joint] = ", ".join([*same_day, _value(line)])
+            days[joint] = line.date
         elif line.kind == "plunger":
             found["plunger"] = _signed(line.value_in or 0.0)
         elif line.kind == "restored":
@@ -222,7 +232,7 @@ def visit_lines(
         text = _RERIGGED if corrected else "rigging checked"
         found.append(LogLine("rigging", text, date=day))
     if row.signed_off:
-        text = f"repair signed off by {row.signed_off}"
+        text = f"signed off by {row.signed_off}"
         after.append(LogLine("signed_off", text, date=_day(row.inspection_date)))
     return [*found, *after]
 

@@ -305,10 +305,13 @@ def _comma_fault(text: str, expected: str) -> CellFaultError:
 def _length_fault(text: str, body: str, expected: str, unit: LengthUnit | None) -> CellFaultError:
     if _COMMA_NUMBER.fullmatch(body):
         return _comma_fault(text, expected)
-    fraction = re.fullmatch(r"(\d{1,9})\s*/\s*(\d{0,8}[1-9]\d{0,8})(\D.*)?", body)
+    fraction = re.fullmatch(r"(?:(\d+)\s+)?(\d{1,9})\s*/\s*(\d{0,8}[1-9]\d{0,8})(\D.*)?", body)
     if fraction:
-        thou = LengthUnit.THOU.from_inches(int(fraction[1]) / int(fraction[2]))
-        value = f"{fraction[1]}/{fraction[2]} in = {thou:.1f} thou"
+        whole, above, below, _ = fraction.groups()
+        share = int(above) / int(below)
+        value = f"{above}/{below} in = {LengthUnit.THOU.from_inches(share):.1f} thou"
+        if whole:
+            value = f"write {whole}{f'{share:g}'.lstrip('0')}"
         return CellFaultError("fraction", expected, f"Fractions are not read: {value}.")
     # A unit beside the number is refused where the header states another: the example is in the
     # header's.

@@ -27,6 +27,7 @@ from mlg_troubleshoot.decision.columns import (
     COLUMNS,
     CONVENTION,
     DATE,
+    GAUGE_U,
     IDENTITY,
     LANDINGS,
     MARGIN,
@@ -466,11 +467,14 @@ def continued(
     known: Inspection, row: Inspection, typed: Collection[str], again: Collection[int]
 ) -> Inspection:
     """A visit with what stands of the gear and was not typed anew: its margin, what the day does
-    not allow; and which of the joints that were to be measured `again` were.
+    not allow, the uncertainty of the same gauge; and which of the joints that were to be measured
+    `again` were.
     """
     stands = [column.filled for column in _STANDS if column.name not in typed]
     if row.inspection_date == known.inspection_date and LANDINGS.name not in typed:
         stands.append(LANDINGS.filled)
+    if row.gauge_u_is_default and row.gauge_id == known.gauge_id:
+        stands += [GAUGE_U.filled, "gauge_u_is_default"]
     more = {name: getattr(known, name) for name in stands}
     # What the reader of a row alone misses in it stands in other visits.
     measured_again = tuple(sorted(row.clearance_in.keys() & again))

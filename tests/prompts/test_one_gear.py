@@ -121,7 +121,7 @@ def test_a_word_that_is_no_outcome_is_refused_with_what_is_expected_and_asked_ag
     screen = sit(*gear("total", "f", "", "3 x", "done"), "").screen
     refused = "'total' is not accepted: expected r (retracted), f (failed) or n (not tried). Did it"
     assert refused in " ".join(screen.split())
-    assert "Or as #3 13, unit mm." in screen
+    assert "Several joints: #3 13 #7 9." in screen
 
 
 @pytest.mark.parametrize(
@@ -162,10 +162,10 @@ def test_words_are_understood_at_every_question(sit: Sit, life: Life, question: 
 
 
 def test_a_reading_counts_where_a_name_is_asked_for_and_an_initial_is_of_a_name(sit, life) -> None:
-    typed = ("p 40", "F. Kern", "#3 8", "gauge 0.5", ".5 thou", "gauge P. 7")
+    typed = ("p 40", "F. Kern", "#3 8", "gauge 0.5", "n", "gauge P. 7 .5 thou")
     screen = sit("order WO-17", *gear("f", "", "done")[:-2], *typed, "").screen
     assert "✗ '0.5' has no unit. Type gauge 0.5 thou, or gauge 0.5 in." in screen
-    assert "✓ standard uncertainty of the gauge .5 thou total play" in screen
+    assert "✓ gauge P. 7, standard uncertainty of the gauge .5 thou total play" in screen
     found = life().inspections[-1].inspection
     assert (found.readings_in, found.clearance_in) == ((0.04,), {3: 0.004})
     assert (found.technician_id, found.gauge_id) == ("F. Kern", "P. 7")
@@ -191,7 +191,9 @@ def test_a_day_without_a_year_is_the_last_such_day(sit: Sit, life: Life) -> None
 
 
 def test_a_fraction_is_refused_with_its_value(sit: Sit) -> None:
-    assert "1/64 in = 15.6 thou" in sit(*gear("f", "1/64", "46", "1/64", "8", "done"), "").screen
+    screen = sit(*gear("f", "1/64", "46", "1/64", "8 1/2", "8", "done"), "").screen
+    assert "1/64 in = 15.6 thou" in screen
+    assert "Fractions are not read: write 8.5." in screen
 
 
 def test_a_reading_that_can_hardly_be_is_confirmed_or_typed_again(sit, life, capsys) -> None:
@@ -393,7 +395,7 @@ def test_an_unfinished_entry_is_continued_by_its_tail_and_begun_anew_by_a_word(s
     with pytest.raises(StoppedError):
         sit(*HEAD, "f", "46", "8")
     screen = sit("N1 LH", "new", "thou", "play", "n", "", "9", "done", *END, "").screen
-    assert "Continued: N1 LH" in screen
+    assert ": tail N1, side LH, " in screen
     assert life().inspections[-1].inspection.outcome is None
 
 

@@ -118,13 +118,21 @@ def test_a_repair_waits_for_its_sign_off_whatever_else_is_typed(sit, begun, stor
     assert screen.count("✗ NEXT stays as it is.") == 2
     assert "NEXT: Nothing is required." in next_of(capsys.readouterr().out[-900:])
     log = mlg("history", "N1", "LH", "--store", store).out
-    assert "repair signed off by A. Jones" in log
+    assert "signed off by A. Jones" in log
 
 
 def test_who_measured_what_stands_is_said_where_several_did(sit, begun, now):
     begun(*failed("8", "11", "done"))
     sit("N1 LH", "name A. Jones", "#5 9", "p 40", "")
     assert now().technician_id == "J. Smith (#3); A. Jones (#5, plunger)"
+
+
+def test_a_day_or_a_name_is_not_changed_below_what_was_found(sit, life):
+    typed = ("f", "", "#3 22", "name Pat Lee", "name Kim Roe", "date today", "done", "same")
+    screen = sit("date yesterday", *gear(*typed)[:-2], "").screen
+    assert "✗ Technician Pat Lee is that of what was typed before." in screen
+    assert "✗ Date 20" in screen
+    assert life().inspections[-1].inspection.technician_id == "Pat Lee"
 
 
 def test_where_nothing_is_required_there_are_no_minutes_and_nothing_was_done(sit, capsys):
@@ -258,6 +266,16 @@ def test_undo_goes_back_visit_by_visit_to_the_beginning_of_the_sitting(sit, begu
     assert f"mlg history void {last.kept.record_id} --why TEXT" in said
     assert life().repairs == ()
     assert last.inspection.readings_in == (0.04,)
+
+
+def test_undo_of_a_first_entry_asks_again_from_its_last_answer(sit, life, now):
+    screen = sit(
+        *failed("8", "11", "done"), "u", "u", "u", "u", "7", "done", "", "", "x", ""
+    ).screen
+    assert "u = undo the last answer" in screen
+    assert "– undone: gauge G-03\nGauge" in screen
+    assert len(life().inspections) == 1
+    assert now().clearance_in == {3: 0.004, 5: 0.0035}
 
 
 def meanwhile(other: Callable[[], object], line: str) -> Callable[[], str]:

@@ -99,7 +99,7 @@ def by_prompt(gear: Gear, value: str, margin: str, convention: Convention) -> Fo
             said = entry.judge(gear, name, text).warnings
         except UsageError as error:
             # A prompt says besides how another joint or unit is named.
-            refused.append(words(error).removesuffix(" Or as #3 13, unit mm."))
+            refused.append(words(error).removesuffix(" Several joints: #3 13 #7 9."))
             continue
         warned = warned or (name == "clearance_3" and bool(said))
         entry.give(name, f"{text} in" if text[-1:].isdigit() or text[-1:] == "." else text)

@@ -41,6 +41,7 @@ LEFT = IDENTITY | {
     "repair_date": "2026-10-11",
 }
 ROWS = [
+    ("Repair", "", "restored #3, #5 on 2026-10-11"),
     ("Outcome", "FAILED", "RETRACTED"),
     ("Plunger", "+46 thou", "+12 thou"),
     ("#1", "8 thou", "as found"),

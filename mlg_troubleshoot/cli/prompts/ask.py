@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import datetime
 
 from mlg_troubleshoot.cli.prompts.entry import (
     FIRST,
@@ -54,6 +55,7 @@ _UNUSUAL = "unusual"
 _YES = ("y", "yes")
 # RH or radial, and "no", are not what the gear did.
 _NO_WORD = {SIDE.name: "r", UNIT.name: "r", CONVENTION.name: "r", _UNUSUAL: "n"}
+_NO_WORD[RIGGING_CHECKED.name] = "n"
 _HOW = {
     ClearanceConvention.RADIAL: "half of a dial reading from limit to limit, or of hole minus pin.",
     ClearanceConvention.DIAMETRAL: "hole by a bore gauge where it is worn most, minus pin by a"
@@ -91,7 +93,7 @@ _QUESTIONS = {
     REPAIR_DATE: ("Date of the repair", "For example 20 Nov, 2026-11-20, yesterday."),
     LAST[0]: ("Measured by", "The name on the sign-off."),
     SIGNED_OFF.name: ("Signed off by", "Who signed the repair off in the aircraft's records."),
-    LAST[1]: ("Gauge", "The gauge set that was used."),
+    LAST[1]: ("Gauge, its name or number", "0.5 thou, alone or after it: standard uncertainty."),
 }
 
 
@@ -121,7 +123,7 @@ class Asker:
     _unfinished: list[Entry] = field(default_factory=list)
     # Unit, convention, day and name that were typed for the gear.
     _stated: dict[str, str] = field(default_factory=dict)
-    _messages: set[str] = field(default_factory=set)
+    _message: str = ""
     # The order of the joints with what was typed when it was planned.
     _order: tuple[dict[str, str], tuple[int, ...]] = ({}, ())
 
@@ -150,7 +152,8 @@ class Asker:
         keys = ["y = I did NEXT" + f" on {day}" * bool(day)] * bool(visit.todo)
         keys += ["d = details", "report"]
         unit = LengthUnit(self.offered(visit)[UNIT.name])
-        keys += [f"u = undo {said_in(visit.undoes, unit)}"] * bool(visit.undoes)
+        undoes = said_in(visit.undoes or "the last answer", unit)
+        keys += [f"u = undo {undoes}"] * visit.is_own
         self._say("   ".join([*keys, "new", "gear", "?"]), "dim")
         while True:
             try:
@@ -192,6 +195,16 @@ class Asker:
                 self.saved.discard(entry.id)
                 self._say("   Nothing was entered.", "magenta")
 
+    def again(self, entry: Entry) -> Entry:
+        """Ask again from the last answer of an entry that was taken back."""
+        # What was kept of it before is void.
+        entry.started = datetime.now()
+        self.entry, self.known = entry, None
+        with self._interrupted():
+            self._undo()
+            self._save()
+            return self._ask_all()
+
     # The course of the questions.
 
     def _opened(self) -> Entry | Visit:
@@ -204,8 +217,9 @@ class Asker:
         if begun:
             self.entry = begun[0]
             self.entry.cells = {**gear, **self.entry.cells}
-            at = f"{self.entry.started:%Y-%m-%d %H:%M}"
-            self._say(f"Continued: {self.entry.identity}, begun {at}. new = begin anew.", "green")
+            began = f"Continued, begun {self.entry.started:%Y-%m-%d %H:%M}"
+            said = (f"{label_of(name)} {text}" for name, text in self.entry.cells.items() if text)
+            self._say(f"{began}: {', '.join(said)}. new = begin anew.", "green")
         elif self.known:
             self._say(f"   Readings are in {_heading(self.offered(self.known))}.")
             return self.known
@@ -317,16 +331,21 @@ class Asker:
 
     def _answer(self, name: str, typed: str) -> None:
         """Take an answer, or a line of words, which counts at every question."""
-        if joint_of(name) and typed.lower() == "done":
+        word = typed.lower()
+        if joint_of(name) and word == "done":
             self._named.clear()
             for each in self._joints():
                 if each not in self.entry.cells:
                     self.entry.give(each, "")
             return
-        if name in _OPTIONAL and typed.lower() == "done":
+        if word == "n" and (joint_of(name) or name in _OPTIONAL):
+            raise UsageError("'n' is not an answer to this", "Enter: not read.")
+        if (name in _OPTIONAL and word == "done") or (
+            name in LAST and word.removesuffix(" gauge") == "same"
+        ):
             typed = ""
         # What begins a tail number, or may answer the question otherwise, does not count as a word.
-        is_word = typed.lower() != _NO_WORD.get(name)
+        is_word = word != _NO_WORD.get(name)
         if name == TAIL_NO.name:
             is_word = typed[1:2].isalpha()
         if joint_of(name) or name == _UNUSUAL:
@@ -343,7 +362,7 @@ class Asker:
             self.entry.give(name, self.entry.cells.get(name, ""))
             self._named = [each for each in self._named if each != name]
         elif not text:
-            raise UsageError("Enter alone is not an answer", "Type the answer, or u to go back.")
+            raise UsageError("Enter alone is not an answer", "Type one, or u to go back.")
         elif name == TAIL_NO.name:
             self._answer_tail(text)
         elif name in READ_IN:
@@ -441,7 +460,7 @@ class Asker:
         """A joint and its reading, typed as two numbers, as a word; refused where both may be the
         figures of one reading.
         """
-        pair = re.fullmatch(r"(\d+)\s+(\.?\d.*)", typed)
+        pair = re.fullmatch(r"(\d+)\s+(\.?\d[\d.]*\s*[a-z\"]*)", typed)
         if pair is None or int(pair[1]) not in self.gear.joint_numbers:
             return typed
         self.entry.accepted(self.gear, name := CLEARANCE.header(int(pair[1])), pair[2])
@@ -465,6 +484,12 @@ class Asker:
         """Give a column, and say what was taken; a reading that can hardly be is confirmed."""
         if name == SIGNED_OFF.name and not (self.known and name in self.known.todo):
             raise UsageError("No repair can be signed off yet", "NEXT says when, and what is open.")
+        is_of_all = name in (DATE.name, LAST[0]) and self.entry.cells.get(name)
+        if is_of_all and name in self.entry.typed and self.entry.has_findings:
+            raise UsageError(
+                f"{label_of(name)} {self.entry.cells[name]} is that of what was typed before",
+                "u takes it back; or end this entry with done before you change.",
+            )
         taken = self.entry.accepted_with_day(self.gear, name, text)
         said = self._doubted(name, taken[name])
         if said and not self._confirmed(name, said, text):
@@ -480,8 +505,9 @@ class Asker:
             given.append(f"{label_of(column)} {kept or 'none'}{kind}{was}")
         self._say(f"✓ {', '.join(given)}", "green")
         done = name == RESTORED_JOINTS.name and {*self._restored()}
-        if done and self.known and done != {*self.known.step.joints}:
-            self._say(f"  NEXT was: {self.known.step.words}.", "magenta")
+        step = self.known.step if self.known else None
+        if done and step and step.joints and done != {*step.joints}:
+            self._say(f"  NEXT was: {step.words}.", "magenta")
         number = joint_of(name)
         if number and taken[name]:
             joint = self.gear.joint(number)
@@ -609,8 +635,8 @@ class Asker:
             self._once(self.saved.save(self.entry))
 
     def _once(self, message: str) -> None:
-        if message and message not in self._messages:
-            self._messages.add(message)
+        if message not in ("", self._message):
+            self._message = message
             self._say(message, "magenta")
 
     def _say(self, text: str, style: str = "") -> None:

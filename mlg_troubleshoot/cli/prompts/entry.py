@@ -71,6 +71,7 @@ _WORD = re.compile(
     rf"(?<![\w#])(?P<word>{_NAMES}|#\s*\d+)(?!\w|\.\s*[a-z])(?:[\s=:]|(?:is|by)\b)*", re.IGNORECASE
 )
 _LENGTH = re.compile(r"\d*[.,]\d|\d+\s*(?:in|thou|mm|mils?)\b")
+_NAME_AND_U = re.compile(r"(.*\S)\s+(\d*\.?\d+\s*(?:in|thou|mm|mils?))", re.IGNORECASE)
 _NEXT_WORD = re.compile(rf"(?<![\w#])(?:{_NAMES})(?!\w)", re.IGNORECASE)
 _NEXT_JOINT = re.compile(rf"{_NEXT_WORD.pattern}|#", re.IGNORECASE)
 # The day of a part of an entry that has its own.
@@ -173,7 +174,7 @@ class Entry(msgspec.Struct, kw_only=True):
         read, problems = judge_length(name, text, options)
         if problems or not isinstance(read, Inspection):
             expected = _ANSWERS if name == OUTCOME.name else problems[0].expected
-            hint = f"Or as {label_of(name)} 13, unit mm." if joint_of(name) else ""
+            hint = f"Several joints: {label_of(name)} 13 #7 9." if joint_of(name) else ""
             raise UsageError(
                 f"{label_of(name)} {text!r} is not accepted: expected {expected}",
                 " ".join([*(at_prompt(problem.remedy) for problem in problems), hint]).strip(),
@@ -256,7 +257,10 @@ class Entry(msgspec.Struct, kw_only=True):
     def accepted_with_day(self, gear: Gear, name: str, typed: str) -> dict[str, str]:
         """The texts of a column and of its day as they are kept, both or none."""
         text, _, day = typed.partition(" on ") if name in DAY_OF else (typed, "", "")
-        taken = {name: self.accepted(gear, name, text)}
+        if name == GAUGE_ID.name and (both := _NAME_AND_U.fullmatch(text)):
+            taken = {name: both[1], GAUGE_U.name: self.accepted(gear, GAUGE_U.name, both[2])}
+        else:
+            taken = {name: self.accepted(gear, name, text)}
         if day:
             taken[DAY_OF[name]] = day_of(day, self.started.date())
         self.require_untyped(name)

@@ -21,6 +21,11 @@ from mlg_troubleshoot.store import Draft, Drafts, Store, login
 
 # How long an answer waits for another writer before the next question comes. [s]
 _PATIENCE_S = 3
+_EDITING = """set enable-bracketed-paste off
+set convert-meta off
+set input-meta on
+set output-meta on
+tab: self-insert"""
 # Characters of an entry that cannot be read: enough for all its answers. [1]
 _MOST_SHOWN = 1500
 
@@ -154,9 +159,6 @@ def _edits_lines() -> bool:
     except ImportError:
         return False
     readline.set_auto_history(False)
-    for setting in ("enable-bracketed-paste", "convert-meta"):
-        readline.parse_and_bind(f"set {setting} off")
-    for setting in ("input-meta", "output-meta"):
-        readline.parse_and_bind(f"set {setting} on")
-    readline.parse_and_bind("tab: self-insert")
+    for setting in _EDITING.splitlines():
+        readline.parse_and_bind(setting)
     return True

@@ -45,16 +45,15 @@ class Sitting:
         self._gear = load_gear(run.asked.gear)
         saved = SavedEntries(place.place)
         self._asker = Asker(self._gear, Terminal(), saved, self._visit)
-        # The ids of what was typed here.
-        self._own: set[str] = set()
+        # What was typed here, by its ids; of what was moved here the entry is not known.
+        self._own: dict[str, Entry | None] = {}
         self._judged: tuple[GearState, task.CheckResult] | None = None
 
     def hold(self, tail: str | None) -> task.CheckResult:
         """Ask until the user ends; what was found last is returned."""
         asked = self._run.asked
         flags = (tail, asked.side, asked.unit, asked.convention)
-        named = zip(HEADING, flags, strict=True)
-        given = {name: str(text) for name, text in named if text is not None}
+        given = {name: str(text) for name, text in zip(HEADING, flags, strict=True) if text}
         found: Entry | Visit | str = self._asker.begin(given)
         visit: Visit | None = None
         while True:
@@ -70,7 +69,10 @@ class Sitting:
             elif not found:
                 return visit.result
             elif found == "u":
-                visit = self._undo(visit)
+                found = self._undo(visit)
+                if isinstance(found, Entry):
+                    continue
+                visit = found
             else:
                 self._show(found, visit)
             found = self._asker.follow(visit)
@@ -113,7 +115,9 @@ class Sitting:
         changed = ", ".join(label_of(name) for name in entry.typed if name not in HEADING)
         undoes = f"the move to {entry.identity}" if moved else f"the correction of {changed}"
         ids = frozenset(each.record_id for each in moved)
-        return replace(visit, undoes=undoes, moved=(key_of(known.row), ids), before=before)
+        return replace(
+            visit, is_own=True, undoes=undoes, moved=(key_of(known.row), ids), before=before
+        )
 
     def _add(self, entry: Entry) -> None:
         """Keep what was found."""
@@ -129,7 +133,7 @@ class Sitting:
             result = task.check_inspection(rows[-1], self._run.asked, self._place)
             self._run.publish(result, entry.unit)
             raise
-        self._own |= {each.record_id for each in added}
+        self._own |= dict.fromkeys((each.record_id for each in added), entry)
         for warning in warnings:
             output.say(f"Warning: {warning}")
 
@@ -137,17 +141,25 @@ class Sitting:
         """Move visits to the gear that they are of; the records there are returned."""
         why = "tail or side corrected at the prompts"
         moved = [move(self._place, each, key, why) for each in records]
-        self._own |= {each.record_id for each in moved}
+        self._own |= dict.fromkeys(each.record_id for each in moved)
         if moved:
             of = f"{len(moved)} of {len(visit.records)} entries"
             output.say(f"Moved {of} from {' '.join(key_of(visit.row))} to {' '.join(key)}.")
         return moved
 
-    def _undo(self, visit: Visit) -> Visit:
-        """Take the last visit back, or a correction or a move of visits to this gear."""
+    def _undo(self, visit: Visit) -> Visit | Entry:
+        """Take the last visit back, or a correction or a move of visits to this gear; the first
+        entry of a gear is asked for again.
+        """
+        last = visit.records[-1]
         if not visit.undoes:
-            void = f"mlg history void {visit.records[-1].record_id} --why TEXT"
-            output.say(f"u goes no further back. At the shell: {void}")
+            if entry := self._own.get(last.record_id):
+                self._place.add([voids(last, "taken back at the prompts")])
+                return self._asker.again(entry)
+            output.say(
+                "u goes no further back than this sitting. Other ways: mlg history amend"
+                f" {last.record_id} COLUMN=VALUE, or mlg history void {last.record_id} --why TEXT"
+            )
             return visit
         key, ids = visit.moved or (key_of(visit.row), ())
         put_back(self._place, visit.before, visit.records)
@@ -155,15 +167,14 @@ class Sitting:
             here = self._visit(*key_of(visit.row)) or visit
             self._move(here, [each for each in here.records if each.record_id in ids], key)
         elif not visit.before:
-            self._place.add([voids(visit.records[-1], "taken back at the prompts")])
+            self._place.add([voids(last, "taken back at the prompts")])
         output.say(f"Undone: {said_in(visit.undoes, self._unit(visit))}.")
         return self._published(*key)
 
     def _published(self, tail: str, side: Side | str) -> Visit:
         """What stands of a gear now, shown and written."""
         visit = self._visit(tail, side)
-        if visit is None:
-            raise TypeError(f"no records of {tail} {side} that were just kept")
+        assert visit is not None
         self._publish(visit)
         return visit
 

@@ -111,10 +111,10 @@ def show_problems(problems: Sequence[Problem]) -> None:
         _show_problem(group)
     rest = len(problems) - sum(len(group.problems) for group in shown)
     if rest:
-        more = (
-            f"… and {rest} more; --json lists all of them, --annotate marks them in your workbook."
+        output.say(
+            f"… and {rest} more; --json lists all of them, --annotate marks them in your workbook.",
+            indent=2,
         )
-        output.say(more, indent=2)
 
 
 def show_unread(files: Sequence[str], screen: output.DataConsole) -> None:
