@@ -483,7 +483,7 @@ class Asker:
     def _give(self, name: str, text: str) -> None:
         """Give a column, and say what was taken; a reading that can hardly be is confirmed."""
         if name == SIGNED_OFF.name and not (self.known and name in self.known.todo):
-            raise UsageError("No repair can be signed off yet", "NEXT says when, and what is open.")
+            raise UsageError("No repair can be signed off yet", "It takes WITHIN MARGIN and NEXT.")
         is_of_all = name in (DATE.name, LAST[0]) and self.entry.cells.get(name)
         if is_of_all and name in self.entry.typed and self.entry.has_findings:
             raise UsageError(
