@@ -21,6 +21,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mlg_troubleshoot.errors import UsageError
 from mlg_troubleshoot.gear.gear import Gear
 from mlg_troubleshoot.reporting import publish as pdf
 from mlg_troubleshoot.reporting.engine import check_fonts
@@ -114,6 +115,12 @@ def test_with_the_date_of_the_sources_two_runs_give_the_same_bytes(judge, gear, 
     time.tzset()
     assert (first.html, first.pdf) == (second.html, second.pdf)
     assert "report made 2024-05-17" in second.text
+
+
+def test_a_date_of_the_sources_that_is_not_valid_is_refused(gear, monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
+    with pytest.raises(UsageError, match="yesterday"):
+        provenance_of(gear, {})
 
 
 def test_another_moment_gives_other_bytes(judge, make, failure, provenance):
@@ -235,6 +242,10 @@ def test_a_box_in_the_pdf_is_noticed() -> None:
         assert engine.convert(page_of("<p>a \U000f1234</p>"), "A4", NOW)[1]
 
 
+def test_ordinary_text_has_no_box(failure: Made) -> None:
+    assert not check_fonts(opened(failure.pdf))
+
+
 def test_ordinary_text_gives_no_note(judge, gear, provenance, tmp_path):
     assert (
         write_inspection_report(judge(FAILURE), gear, tmp_path, provenance=provenance).notes == ()
@@ -263,3 +274,9 @@ def test_a_name_can_be_read_and_follows_from_the_fields() -> None:
     assert name.startswith("mlg-N123AB-LH-R-1-")
     assert safe_stem("N123AB", "LH", "R-1") == name
     assert safe_stem("a-", "b") != safe_stem("a", "-b")
+
+
+@pytest.mark.parametrize("wrong", [{"formats": ("docx",)}, {"page": "B7"}])
+def test_an_unknown_format_or_paper_is_refused(wrong, judge, make):
+    with pytest.raises(UsageError, match=r"docx|B7"):
+        make(judge(FAILURE), **wrong)
