@@ -580,8 +580,7 @@ class Asker:
             return self.entry.day.isoformat()
         if name == RESTORED_JOINTS.name and self.known:
             return " ".join(map(str, self.known.step.joints))
-        asked = LAST[0] if name == SIGNED_OFF.name else name
-        return self.saved.offered().get(asked, "")
+        return self.saved.offered().get(name, "")
 
     def _unusual(self) -> str:
         """What is unusual and not confirmed, in one line."""
