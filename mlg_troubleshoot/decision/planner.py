@@ -391,7 +391,7 @@ class _PlanBuilder:
             self._read_the_plunger(again=True)
         elif not self.read_plunger or self.over or self._in_doubt():
             minutes = self.gear.plunger_reading.value
-            text = sentences.read_to_clear(minutes)
+            text = sentences.read_to_clear(minutes, repaired=self.inspection.is_repaired)
             self._step(Action.READ_PLUNGER, minutes, text, required=False)
             return self._done()
         return self._end(End.OUTSIDE_NO_COMPLAINT if self.beyond else End.TOO_CLOSE)
@@ -602,9 +602,12 @@ class _PlanBuilder:
         """Go on: the plan ends."""
         if where is End.CANNOT_CLEAR and self._barred():
             return self._stop_for_today()
-        text = sentences.go_on(
-            where, read=self.read_plunger, beyond=self.beyond, looked=self.looked
-        )
+        if where is End.TOO_CLOSE and self.inspection.is_repaired:
+            text = sentences.SIGN_OFF_TOO_CLOSE
+        else:
+            text = sentences.go_on(
+                where, read=self.read_plunger, beyond=self.beyond, looked=self.looked
+            )
         required = where is not End.TOO_CLOSE
         self._step(Action.CONTINUE, 0.0, text, required=required)
         return Plan(tuple(self.steps), where)

@@ -42,10 +42,12 @@ _SET_THAT_HOLDS = (
     "set of joints that can be restored brings the worst case within the margin with"
     f" {100.0 * CONFORMANCE:.0f} % probability."
 )
+_SIGN_OFF = "Sign the repair off in the aircraft's records."
+_NOTHING = "Nothing is required."
+_TOO_CLOSE = "The gear is too close to its margin to show that it is within it."
+SIGN_OFF_TOO_CLOSE = f"{_SIGN_OFF} {_TOO_CLOSE}"
 _GO_ON = {
-    End.TOO_CLOSE: (
-        "Nothing is required. The gear is too close to its margin to show that it is within it."
-    ),
+    End.TOO_CLOSE: f"{_NOTHING} {_TOO_CLOSE}",
     End.OUTSIDE_NO_COMPLAINT: (
         "Refer the gear to engineering. The plunger is outside its margin; no failure is recorded."
     ),
@@ -214,9 +216,7 @@ _COUNTS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight",
 
 def done(unread: int, *, repaired: bool) -> str:
     """Step DONE; `repaired`: joints were restored; `unread`: joints that were not read."""
-    said = [
-        "Sign the repair off in the aircraft's records." if repaired else "Nothing is required."
-    ]
+    said = [_SIGN_OFF if repaired else _NOTHING]
     if unread:
         count = _COUNTS[unread] if unread < len(_COUNTS) else str(unread)
         verb, what = ("was", "it") if unread == 1 else ("were", "them")
@@ -227,11 +227,11 @@ def done(unread: int, *, repaired: bool) -> str:
     return " ".join([*said, NOT_A_RELEASE])
 
 
-def read_to_clear(minutes: float) -> str:
+def read_to_clear(minutes: float, *, repaired: bool) -> str:
     """Step READ_PLUNGER of a gear without a complaint."""
     return (
-        "Nothing is required. To show that the gear is within its margin, read the plunger"
-        f" ({minutes:.0f} min)."
+        f"{_SIGN_OFF if repaired else _NOTHING} To show that the gear is within its margin, read"
+        f" the plunger ({minutes:.0f} min)."
     )
 
 

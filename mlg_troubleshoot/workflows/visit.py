@@ -58,10 +58,8 @@ class Visit:
     @property
     def todo(self) -> tuple[str, ...]:
         """The columns that NEXT asks for; none where nothing is required."""
-        if self.step.action is Action.DONE and self.row.is_repaired:
-            return (SIGNED_OFF.name,)
         if not self.step.required:
-            return ()
+            return (SIGNED_OFF.name,) * self.row.is_repaired
         if self.step.action in _TO_READ:
             return tuple(map(CLEARANCE.header, self.step.joints))
         asked = _ASKS.get(self.step.action)

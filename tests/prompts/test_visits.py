@@ -121,6 +121,17 @@ def test_a_repair_waits_for_its_sign_off_whatever_else_is_typed(sit, begun, stor
     assert "signed off by A. Jones" in log
 
 
+def test_a_repair_is_signed_off_where_the_chance_keeps_the_gear_close_to_its_margin(sit, capsys):
+    """Joints at their limits but the restored one: the chance stays a little above 5 %."""
+    read = "#1 8 #2 11 #3 26 #4 6 #5 14 #6 7.5 #7 7 #8 9 #9 10 #10 8"
+    sit(*failed(read), "restored 3", "", "1", "p 17", "r", "")
+    out = capsys.readouterr().out
+    assert "CLOSE TO THE MARGIN" in out
+    assert "NEXT: Sign the repair off" in next_of(out[-900:])
+    sit("N1 LH", "sign off A. Jones", "")
+    assert next_of(capsys.readouterr().out[-900:]).startswith("NEXT: Nothing is required.")
+
+
 def test_who_measured_what_stands_is_said_where_several_did(sit, begun, now):
     begun(*failed("8", "11", "done"))
     sit("N1 LH", "name A. Jones", "#5 9", "p 40", "")

@@ -247,6 +247,11 @@ def test_a_sound_gear_needs_no_repair(judge: Judge, make: Make) -> None:
     assert "None needed" in section
 
 
+def test_the_plunger_is_shown_as_it_was_read_each_time(judge: Judge, make: Make) -> None:
+    page = make(judge(SOUND, readings_in=(0.041, 0.004)), formats=("html",)).html
+    assert '<td class="n">+0.0410, +0.0040</td>' in page
+
+
 def test_a_gear_measured_within_its_margin_is_said_neither_to_fail_nor_to_lack_a_repair(
     judge, make
 ):
