@@ -138,6 +138,15 @@ def test_who_measured_what_stands_is_said_where_several_did(sit, begun, now):
     assert now().technician_id == "J. Smith (#3); A. Jones (#5, plunger)"
 
 
+def test_a_colleague_who_did_not_read_the_gear_is_not_named_unasked(sit, begun, life):
+    begun(*failed("8", "done"))
+    sit("N2 LH", "", "r", "", "done", "A. Jones", "G-7", "")
+    screen = sit("N1 LH", "#5 9", "F. Kern", "", "#3 7", "r", "").screen
+    assert screen.count("Measured by (Enter: A. Jones)") == screen.count("(Enter: G-7)") == 1
+    rows = [visit.inspection for visit in life().inspections[-3:]]
+    assert [row.technician_id for row in rows] == ["F. Kern"] * 3
+
+
 def test_a_day_or_a_name_is_not_changed_below_what_was_found(sit, life):
     typed = ("f", "", "#3 22", "name Pat Lee", "name Kim Roe", "date today", "done", "same")
     screen = sit("date yesterday", *gear(*typed)[:-2], "").screen

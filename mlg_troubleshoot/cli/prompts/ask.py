@@ -148,8 +148,7 @@ class Asker:
         empty for the end. An entry without a finding corrects the last one.
         """
         self.known = visit
-        day = self._stated.get(DATE.name)
-        keys = ["y = I did NEXT" + f" on {day}" * bool(day)] * bool(visit.todo)
+        keys = ["y = I did NEXT"] * bool(visit.todo)
         keys += ["d = details", "report"]
         unit = LengthUnit(self.offered(visit)[UNIT.name])
         undoes = said_in(visit.undoes or "the last answer", unit)
@@ -161,7 +160,7 @@ class Asker:
                 word = typed.lower()
                 if word in ("", "d", "report", "open"):
                     return word
-                if word in ("n", "no") or (word == "y" and not visit.todo):
+                if word == "n" or (word == "y" and not visit.todo):
                     raise UsageError(
                         "NEXT stays as it is", "Type what was found, as r, f or p 12. Enter ends."
                     )
@@ -232,6 +231,11 @@ class Asker:
             self._stated.pop(LAST[0], None)
             return Entry.new(self.gear, cells | self._stated)
         cells |= self.offered(visit)
+        # Nobody is named, and no gauge, that did not read this gear before.
+        read_by = f"{visit.row.technician_id} {visit.row.gauge_id}"
+        for name in {*LAST} - self._stated.keys():
+            if cells.get(name, "") not in read_by:
+                del cells[name]
         return Entry.new(self.gear, cells, [*visit.todo] if word == "y" else [])
 
     def offered(self, visit: Visit) -> dict[str, str]:
@@ -279,6 +283,8 @@ class Asker:
             columns += self.entry.todo
             if restored := self._restored():
                 columns += [REPAIR_DATE, *map(CLEARANCE.header, restored)]
+            if any(map(_is_length, self.entry.typed)):
+                columns += filter(self.saved.offered().get, LAST)
         # A unit is asked for where something is read in it.
         is_reading = self.entry.todo is None or any(map(_is_length, columns[len(HEADING) :]))
         skipped = () if is_reading else READ_IN

@@ -232,12 +232,12 @@ class Entry(msgspec.Struct, kw_only=True):
         """What was typed, as visits: what was found before a repair, the repair, and what was found
         after it.
         """
-        names = [*self.cells]
         repair = self._repair()
         if not repair:
             return [self.inspection(gear)]
         done = self.cells.get(REPAIR_DATE) or self.day.isoformat()
-        facts = {name for name in names if joint_of(name) or name in (*_FACTS, *DAY_OF.values())}
+        parts_of_days = (*_FACTS, *DAY_OF.values())
+        facts = {name for name in self.cells if joint_of(name) or name in parts_of_days}
         found = facts - {*repair, REPAIR_DATE}
         before = found & self._before_repair()
         parts = (

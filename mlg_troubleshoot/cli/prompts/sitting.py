@@ -101,8 +101,8 @@ class Sitting:
             own = [each for each in known.records if each.record_id in self._own]
             moved = self._move(known, own or known.records[-1:] * (not entry.has_findings), key)
         before = tuple(moved or known.records) if known else ()
+        changes = {name: entry.cells[name] for name in entry.typed if name not in HEADING}
         if known is not None and not entry.has_findings:
-            changes = {name: entry.cells[name] for name in entry.typed if name not in HEADING}
             for error in correct(self._place, self._gear, before, changes):
                 output.say(f"Not changed: {error.message}. {error.remedy}")
         else:
@@ -112,7 +112,7 @@ class Sitting:
         self._asker.saved.finish(entry)
         if known is None or entry.has_findings or visit.records == known.records:
             return visit
-        changed = ", ".join(label_of(name) for name in entry.typed if name not in HEADING)
+        changed = ", ".join(map(label_of, changes))
         undoes = f"the move to {entry.identity}" if moved else f"the correction of {changed}"
         ids = frozenset(each.record_id for each in moved)
         return replace(

@@ -35,15 +35,14 @@ def show(judgement: Judgement, gear: Gear, screen: DataConsole, *, detail: bool)
     body = [origin, title, *_body(judgement, screen)]
     notes = [text(f"* {screen.said(note)}") for note in judgement.warnings]
     room = _LINES - 1 - lines_of(body)
-    if isinstance(judgement, Assessment) and detail:
-        # The report has the indices.
-        _show_joints(judgement, screen)
-        restored = {number for each in judgement.repair_sets or () for number in each.joints}
-        parts = sorted({gear.joint(number).new_part.value for number in restored})
-        show_page("detail", screen, a=judgement, gear=gear, parts=parts)
-    elif isinstance(judgement, Assessment):
-        _show_joints(judgement, screen, _JOINTS)
+    if isinstance(judgement, Assessment):
+        _show_joints(judgement, screen, None if detail else _JOINTS)
         room -= _JOINTS + 2
+        if detail:
+            # The report has the indices.
+            restored = {number for each in judgement.repair_sets or () for number in each.joints}
+            parts = sorted({gear.joint(number).new_part.value for number in restored})
+            show_page("detail", screen, a=judgement, gear=gear, parts=parts)
     shown = len(notes)
     while not detail and lines_of(notes[:shown]) > max(room, 0):
         shown -= 1
@@ -83,7 +82,7 @@ def _what_follows(steps: Sequence[Step]) -> str:
     return Sentence.of("Expected after that: {}{}{}", rest, between, steps[-1].text)
 
 
-def _show_joints(a: Assessment, screen: DataConsole, most: int | None = None) -> None:
+def _show_joints(a: Assessment, screen: DataConsole, most: int | None) -> None:
     """Show the joints in the order to read them, with a limit or without: so many."""
     row = a.inspection
     first = a.next_action
