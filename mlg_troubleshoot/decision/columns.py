@@ -480,6 +480,14 @@ RIGGING_CHECKED = Column(
     bears_verdict=True,
     blank_by_word=False,
 )
+OTHER_REPAIR = Column(
+    name="other_repair",
+    holds=Holds.TEXT,
+    meaning="What was repaired other than joints and rigging, for example the selector valve.",
+    bears_verdict=True,
+    blank_by_word=False,
+    in_template=False,
+)
 SIGNED_OFF = Column(
     name="signed_off",
     holds=Holds.TEXT,
@@ -575,6 +583,7 @@ COLUMNS: tuple[Column, ...] = (
     ),
     REMARKS,
     *OF_THE_DAY,
+    OTHER_REPAIR,
     SIGNED_OFF,
     AXIAL_FLOAT,
 )

@@ -252,6 +252,8 @@ class Inspection(Result):
     repair_date, plunger_date, outcome_date : datetime.date or None
         When they were restored, the plunger was read and the outcome was seen; a `datetime` states
         the time.
+    other_repair : str or None
+        What was repaired on `repair_date` other than joints and rigging.
     signed_off : str or None
         Who signed the repair off.
     rigging_checked : RiggingCheck or None
@@ -307,6 +309,7 @@ class Inspection(Result):
     repair_date: date | None = None
     plunger_date: date | None = None
     outcome_date: date | None = None
+    other_repair: str | None = None
     signed_off: str | None = None
     rigging_checked: RiggingCheck | None = None
     measured_again: tuple[int, ...] = ()
@@ -336,8 +339,11 @@ class Inspection(Result):
 
     @property
     def is_repaired(self) -> bool:
-        """Whether joints were restored, or the rigging set right, since the failure."""
-        return bool(self.restored_joints) or self.rigging_checked is RiggingCheck.CORRECTED
+        """Whether joints were restored, the rigging set right or something else repaired since the
+        failure.
+        """
+        done = self.restored_joints or self.other_repair
+        return bool(done) or self.rigging_checked is RiggingCheck.CORRECTED
 
     def is_since_repair(self, day: date | None) -> bool | None:
         """Whether what was found on a day of its own, or else in the inspection, is newer than the
@@ -398,7 +404,7 @@ class Inspection(Result):
         """Whether nothing was found or done, or may have been: no reading, outcome, repair, check
         or question.
         """
-        done = self.restored_joints, self.signed_off
+        done = self.restored_joints, self.other_repair, self.signed_off
         found = (self.clearance_in, self.readings_in, self.outcome, *done)
         is_blank = self.rigging_checked is None and self.plunger_down_lock_in is None
         return is_blank and not any(found) and not self.unit_question

@@ -329,7 +329,8 @@ def _moments(visit: GearVisit) -> list[Moment]:
     row = visit.inspection
     is_alone = visit.kept.kind in _WORK
     done = [frozenset(row.restored_joints)] * bool(row.restored_joints)
-    done += [frozenset()] * (row.rigging_checked is RiggingCheck.CORRECTED)
+    is_other = row.rigging_checked is RiggingCheck.CORRECTED or bool(row.other_repair)
+    done += [frozenset()] * is_other
     day = "" if row.repair_date is None else row.repair_date.isoformat()[:10]
     if is_alone:
         return [Moment(day, row.gear_landings, joints, visit, is_alone) for joints in done]

@@ -105,7 +105,7 @@ def as_found_as_left(lines: Iterable[LogLine]) -> list[AsFoundAsLeft]:
 
 
 def _is_repair(line: LogLine) -> bool:
-    return line.kind == "restored" or line.text == _RERIGGED
+    return line.kind in ("restored", "other_repair") or line.text == _RERIGGED
 
 
 def _value(line: LogLine) -> str:
@@ -231,6 +231,8 @@ def visit_lines(
         corrected = row.rigging_checked is RiggingCheck.CORRECTED
         text = _RERIGGED if corrected else "rigging checked"
         found.append(LogLine("rigging", text, date=day))
+    if row.other_repair:
+        found.append(LogLine("other_repair", f"repaired {row.other_repair}", date=day))
     if row.signed_off:
         text = f"signed off by {row.signed_off}"
         after.append(LogLine("signed_off", text, date=_day(row.inspection_date)))

@@ -264,8 +264,8 @@ def _when(visit: GearVisit, stated: date | None) -> date | None:
     return stated or (None if updated else visit.at)
 
 
-# Stand in place of a joint for any repair, and for one of the rigging.
-_ANY, _RIGGING = 0, -1
+# Stand in place of a joint for any repair, for one of the rigging, and for one of neither.
+_ANY, _RIGGING, _OTHER = 0, -1, -2
 
 
 class _Known:
@@ -337,7 +337,8 @@ class _Known:
         if not row.is_repaired:
             return
         is_rigging = row.rigging_checked is RiggingCheck.CORRECTED
-        for what in (_ANY, *row.restored_joints, *[_RIGGING] * is_rigging):
+        others = [_RIGGING] * is_rigging + [_OTHER] * bool(row.other_repair)
+        for what in (_ANY, *row.restored_joints, *others):
             self.repairs.setdefault(what, []).append(_repair_of(visit))
 
     def left_of(self, visit: GearVisit) -> Inspection | None:
@@ -714,10 +715,12 @@ class _AsOf:
         days = [_day_of(r.at) for r in (*own, *others.values()) if r.at is not None]
         day = max(days, default=self._visit.at or _SOME_DAY)
         done = {what for what, later in since.items() if later} | self._own.repairs.keys()
-        joints = tuple(sorted(done - {_ANY, _RIGGING}))
+        joints = tuple(sorted(done - {_ANY, _RIGGING, _OTHER}))
         changed: dict[str, Any] = {"restored_joints": joints, "repair_date": day}
         if _RIGGING in done:
             changed["rigging_checked"] = RiggingCheck.CORRECTED
+        if later := since.get(_OTHER):
+            changed["other_repair"] = later[-1].visit.inspection.other_repair
         self._say_repairs([r for r in others.values() if not _is_later(self._visit, r)])
         return changed | {name: _place(e, self._of(), day) for name, e in dated.items()}
 
@@ -738,7 +741,8 @@ class _AsOf:
             done = repair.visit.inspection
             joints = [f"#{joint}" for joint in done.restored_joints]
             rerigged = done.rigging_checked is RiggingCheck.CORRECTED
-            what = " and ".join([", ".join(joints)] * bool(joints) + ["the rigging"] * rerigged)
+            parts = [", ".join(joints), "the rigging" * rerigged, done.other_repair]
+            what = " and ".join(filter(None, parts))
             when = "without a date" if repair.at is None else f"on {repair.at.isoformat()}"
             then = (
                 "what is older does not count"

@@ -132,6 +132,20 @@ def test_a_repair_is_signed_off_where_the_chance_keeps_the_gear_close_to_its_mar
     assert next_of(capsys.readouterr().out[-900:]).startswith("NEXT: Nothing is required.")
 
 
+def test_what_was_repaired_elsewhere_ends_a_failure_once_the_gear_retracts(sit, capsys, store):
+    """The plunger reads within its margin, and the gear failed: the selector valve leaked."""
+    sit(*gear("f", "8", "#1 8 #2 8 #3 8 #4 6 #5 8 #6 7 #7 7 #8 9 #9 7 #10 8"), "")
+    assert "Check hydraulics" in capsys.readouterr().out
+    sit("N1 LH", "repaired selector valve", "")
+    assert "Read the plunger displacement" in next_of(capsys.readouterr().out[-900:])
+    sit("N1 LH", "p 8", "r", "")
+    assert "NEXT: Sign the repair off" in capsys.readouterr().out[-900:]
+    sit("N1 LH", "y", "A. Jones", "")
+    assert "WITHIN MARGIN" in capsys.readouterr().out[-1200:]
+    log = mlg("history", "N1", "LH", "--store", store).out
+    assert "repaired selector valve" in log
+
+
 def test_who_measured_what_stands_is_said_where_several_did(sit, begun, now):
     begun(*failed("8", "11", "done"))
     sit("N1 LH", "name A. Jones", "#5 9", "p 40", "")

@@ -16,6 +16,7 @@ from mlg_troubleshoot.decision.columns import (
     DATE,
     GAUGE_ID,
     GAUGE_U,
+    OTHER_REPAIR,
     OUTCOME,
     PLUNGER_DISPLACEMENT,
     RECORD_ID,
@@ -58,6 +59,7 @@ WORD_HELP = """At any question:
   #7 13, p 46      joint 7, the plunger; p none clears it, #7 goes to it
   f, r, n          failed, retracted, not tried
   restored 3 5 on 25 Nov, rigging yes (checked and right; or corrected)
+  repaired selector valve                    other than joints and rigging
   date 20 Nov, unit mm, convention play      for what is typed from here on
   side RH, tail N123AB                       corrects the gear of what was typed
   cannot reach 3 5, no spare 3 (none: no longer), landings 4000, margin 28
@@ -75,7 +77,7 @@ _NAME_AND_U = re.compile(r"(.*\S)\s+(\d*\.?\d+\s*(?:in|thou|mm|mils?))", re.IGNO
 _NEXT_WORD = re.compile(rf"(?<![\w#])(?:{_NAMES})(?!\w)", re.IGNORECASE)
 _NEXT_JOINT = re.compile(rf"{_NEXT_WORD.pattern}|#", re.IGNORECASE)
 # The day of a part of an entry that has its own.
-_REPAIR = (RESTORED_JOINTS.name, RIGGING_CHECKED.name)
+_REPAIR = (RESTORED_JOINTS.name, RIGGING_CHECKED.name, OTHER_REPAIR.name)
 _FACTS = (OUTCOME.name, PLUNGER, SIGNED_OFF.name, *_REPAIR)
 DAY_OF = {RESTORED_JOINTS.name: REPAIR_DATE, PLUNGER: "plunger_date", OUTCOME.name: "outcome_date"}
 
