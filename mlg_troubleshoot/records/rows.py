@@ -840,7 +840,7 @@ class RowReader:
         self.not_measured: Counter[str] = Counter()
         self._without_unit: set[str | None] = set()
         # Somewhere it is tomorrow already.
-        self._latest = date.today() + timedelta(days=1)
+        self._latest = min(date.today(), date.max - timedelta(1)) + timedelta(1)
         self._day_of = lru_cache(self._read_day_of_visit)
         # The dates of the column, and those of rows that wait for the others.
         self._days: set[Cell] = set()
