@@ -82,8 +82,7 @@ def refuse_gone(given: Sequence[str]) -> None:
         for before, word in pairwise(("", *given))
         if not word.startswith("-") and before != "--gear"
     ]
-    flags = [word.partition("=")[0] for word in takewhile("--".__ne__, given)]
-    flags = [flag for flag in flags if flag.startswith("--")]
+    flags = [w.partition("=")[0] for w in takewhile("--".__ne__, given) if w.startswith("--")]
     command = "".join(words[:1])
     own = [f"{command} {flag}" for flag in flags]
     for name in (command, " ".join(words[:2]), *own, *flags):

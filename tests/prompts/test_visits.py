@@ -272,7 +272,9 @@ CORRECTIONS = {
 def test_an_undo_of_a_correction_brings_back_exactly_what_was_there(sit, begun, life, line, capsys):
     begun(*gear("f", "46; 41", "8", "done"))
     before = facts(life())
-    screen = sit("N1 LH", line, "u", "").screen
+    asked = ["y"] * line.startswith("side")
+    screen = sit("N1 LH", line, *asked, "u", "").screen
+    assert ("side RH: what was typed for N1 LH moves there." in screen) == bool(asked)
     assert f"u = undo the {CORRECTIONS[line]}" in screen
     assert f"Undone: the {CORRECTIONS[line]}." in capsys.readouterr().err
     assert facts(life()) == before

@@ -424,10 +424,10 @@ class Asker:
             try:
                 again = self._typed("y = it is right; or type it again", said)
             except BackError:
-                again = "no"
+                again = "n"
             if again.lower() in (*_YES, text.lower()):
                 return True
-            if again.lower() in ("n", "no"):
+            if again.lower() == "n":
                 self._named = [each for each in self._named if each != name]
                 self._say(f"– undone: {label_of(name)} {text}", "magenta")
                 return False
@@ -528,6 +528,8 @@ class Asker:
         """What is said of a clearance that can hardly be, of a plunger reading beyond what all
         joints at their limits could cause or in another unit.
         """
+        if name in IDENTITY and self.known and not self.known.is_own:
+            return f"{label_of(name)} {text}: what was typed for {self.entry.identity} moves there."
         if not (text and _is_length(name)):
             return ""
         reads = [self.entry.judge(self.gear, name, each) for each in text.split("; ")]

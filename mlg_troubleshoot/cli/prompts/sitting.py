@@ -106,7 +106,6 @@ class Sitting:
             for error in correct(self._place, self._gear, before, changes):
                 output.say(f"Not changed: {error.message}. {error.remedy}")
         else:
-            moved = []
             self._add(entry)
         visit = self._published(*key)
         self._asker.saved.finish(entry)
@@ -174,7 +173,7 @@ class Sitting:
     def _published(self, tail: str, side: Side | str) -> Visit:
         """What stands of a gear now, shown and written."""
         visit = self._visit(tail, side)
-        assert visit is not None
+        assert visit
         self._publish(visit)
         return visit
 
