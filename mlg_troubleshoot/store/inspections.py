@@ -15,10 +15,10 @@ from typing import Any
 
 import sqlalchemy as sql
 
-from mlg_troubleshoot.decision.columns import COLUMNS, DATE, Holds
+from mlg_troubleshoot.decision.columns import COLUMNS, CONVENTION, DATE, GAUGE_U, Holds
 from mlg_troubleshoot.decision.inspection import EnteredClearance, Inspection, RowSource
 from mlg_troubleshoot.store.database import DRAFTS, Record, RecordKind, Store, packed
-from mlg_troubleshoot.units import Length, LengthUnit, Sentence
+from mlg_troubleshoot.units import ClearanceConvention, Length, LengthUnit, Sentence
 
 # What says where and how an inspection was entered, not what was found.
 NOT_CONTENT = ("record_id", "source", "warnings", "entered", "unit_question")
@@ -111,15 +111,18 @@ def inspection_from(record: Record, body: Any = None) -> Inspection:
 
 
 def cells_of(said: Mapping[str, Any]) -> dict[str, Any]:
-    """What an inspection says, by its words in a sentence."""
+    """What an inspection says, by its words in a sentence; clearances as they were read."""
+    factor = ClearanceConvention(said[CONVENTION.filled]).per_radial
     clearance = sorted(said.get("clearance_in", {}).items(), key=lambda each: int(each[0]))
-    left_out = (*NOT_CONTENT, "clearance_in")
+    left_out = (*NOT_CONTENT, "clearance_in", "gauge_u_is_default")
     others = {
-        _WORDS.get(name, name.replace("_", " ")): _in_words(name, value)
+        _WORDS.get(name, name.replace("_", " ")): _in_words(
+            name, value * factor if name == GAUGE_U.filled else value
+        )
         for name, value in said.items()
         if name not in left_out
     }
-    return {f"#{joint}": Length.brief(value) for joint, value in clearance} | others
+    return {f"#{joint}": Length.brief(value * factor) for joint, value in clearance} | others
 
 
 _WORDS = {column.filled: column.said for column in COLUMNS}

@@ -35,7 +35,7 @@ WRONG = {
     "#": (
         *("x", "6,5", "-5", "1/64", "9 mm", "200", "3 cm", "#11 5", "1e5", "5 5", "p", "margin 0"),
         *("#99 5", "landings 3,412", "margin x", "date 99 Nov", "date 03/04/2026", "side x"),
-        *("temperature 99", "1 4", "gauge 0.5", "n"),
+        *("temperature 99", "1 4", "gauge 0.5", "gauge +/- 0.5 thou", "n"),
     ),
 }
 

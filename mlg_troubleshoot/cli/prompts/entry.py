@@ -72,7 +72,7 @@ _NAMES = "|".join(sorted((*SHORT, *OUTCOMES), key=len, reverse=True))
 _WORD = re.compile(
     rf"(?<![\w#])(?P<word>{_NAMES}|#\s*\d+)(?!\w|\.\s*[a-z])(?:[\s=:]|(?:is|by)\b)*", re.IGNORECASE
 )
-_LENGTH = re.compile(r"\d*[.,]\d|\d+\s*(?:in|thou|mm|mils?)\b")
+_LENGTH = re.compile(r"[±+/-]*\s*(?:\d*[.,]\d|\d+\s*(?:in|thou|mm|mils?)\b)")
 _NAME_AND_U = re.compile(r"(.*\S)\s+(\d*\.?\d+\s*(?:in|thou|mm|mils?))", re.IGNORECASE)
 _NEXT_WORD = re.compile(rf"(?<![\w#])(?:{_NAMES})(?!\w)", re.IGNORECASE)
 _NEXT_JOINT = re.compile(rf"{_NEXT_WORD.pattern}|#", re.IGNORECASE)
