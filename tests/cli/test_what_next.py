@@ -48,7 +48,7 @@ def test_the_quickest_repair_is_shown_with_what_it_leaves() -> None:
     )
     shown = said(*HAND, "--detail", *flags)
     assert re.search(
-        r"restore kind minutes worst case in within second repair #3 and #5 sure \d+ 0\.01\d\d",
+        r"restore kind minutes worst case in within second repair #3, #5 sure \d+ 0\.01\d\d",
         shown,
     )
     assert "A restored joint counts with the radial clearance of a new part, 0.0005 in." in shown
