@@ -218,7 +218,7 @@ class Run:
                 " --convention.",
             )
 
-        assert self._place is not None
+        assert self._place
         from mlg_troubleshoot.cli.prompts.sitting import Sitting
 
         return Sitting(self, self._place).hold(self._flags.tail)
