@@ -60,13 +60,13 @@ WAYS = {
 # writes it down again.
 BUDGETS: dict[str, int] = {
     "(top)": 8607,
-    "cli": 26000,
-    "decision": 28721,
+    "cli": 26020,
+    "decision": 28760,
     "diagnosis": 33368,
     "gear": 11149,
     "geometry": 5766,
     "indices": 2976,
-    "life": 18701,
+    "life": 18716,
     "misfit": 17624,
     "notebook": 1729,
     "paper": 5874,
@@ -76,7 +76,7 @@ BUDGETS: dict[str, int] = {
     "store": 7965,
     "surveying": 4496,
     "wear": 6804,
-    "workflows": 15981,
+    "workflows": 15995,
 }
 _NO_CODE = {
     *(tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT),

@@ -391,7 +391,7 @@ class _PlanBuilder:
             self._read_the_plunger(again=True)
         elif not self.read_plunger or self.over or self._in_doubt():
             minutes = self.gear.plunger_reading.value
-            text = sentences.read_to_clear(minutes, repaired=self.inspection.is_repaired)
+            text = sentences.read_to_clear(minutes)
             self._step(Action.READ_PLUNGER, minutes, text, required=False)
             return self._done()
         return self._end(End.OUTSIDE_NO_COMPLAINT if self.beyond else End.TOO_CLOSE)
@@ -413,22 +413,26 @@ class _PlanBuilder:
         """Whether the plunger is read again: read only once and at the edge of its margin, or in
         doubt.
         """
+        once = len(self.inspection.standing_readings_in) < 2
+        return (once and self._is_at_edge(self.plunger_in)) or self._in_doubt()
+
+    def _is_at_edge(self, reading_in: float) -> bool:
         cases = self.cases
         i = self.row
         u = np.hypot(cases.plunger_u_in[i], cases.margin_u_in[i])
-        at_edge = abs(abs(self.plunger_in) - cases.margin_in[i]) < THRESHOLDS.doubtful * u
-        once = len(self.inspection.standing_readings_in) < 2
-        return bool(at_edge and once) or self._in_doubt()
+        return bool(abs(abs(reading_in) - cases.margin_in[i]) < THRESHOLDS.doubtful * u)
 
     def _in_doubt(self) -> bool:
         """Whether the plunger was perhaps read before the repair, or its readings are at odds."""
         return self.inspection.is_plunger_in_doubt or self._are_at_odds()
 
     def _are_at_odds(self) -> bool:
-        """Whether two readings of the plunger differ by more than their uncertainty: a third shows
-        which of them was a slip.
+        """Whether two readings of the plunger, neither at the edge of its margin, differ by more
+        than their uncertainty: a third shows which of them was a slip.
         """
-        return len(self.inspection.standing_readings_in) == 2 and readings_differ(self.inspection)
+        readings = self.inspection.standing_readings_in
+        is_pair = len(readings) == 2 and readings_differ(self.inspection)
+        return is_pair and not any(map(self._is_at_edge, readings))
 
     def _failed(self) -> Plan:
         """A gear that failed: the plunger first, then what has the fewest expected minutes."""
@@ -550,8 +554,11 @@ class _PlanBuilder:
         return self._retract()
 
     def _read_the_plunger(self, *, again: bool = False) -> None:
-        in_doubt = self.inspection.is_plunger_in_doubt
-        text = sentences.READ_PLUNGER_AGAIN if again and not in_doubt else sentences.READ_PLUNGER
+        text = sentences.READ_PLUNGER
+        if again and self._are_at_odds():
+            text = sentences.READ_A_THIRD_TIME
+        elif again and not self.inspection.is_plunger_in_doubt:
+            text = sentences.READ_PLUNGER_AGAIN
         self._step(Action.READ_PLUNGER, self.gear.plunger_reading.value, text)
 
     def _retract(self) -> Plan:

@@ -33,10 +33,9 @@ NOT_A_RELEASE = "This is not a release to service."
 CONFIRM = "Do not use. Confirm the readings in question and their unit, or correct them."
 RETRACT = "Retract the gear (trial retraction). Enter the outcome with its date and time."
 READ_PLUNGER = "Read the plunger displacement at mid-position."
-READ_PLUNGER_AGAIN = (
-    "Read the plunger displacement at mid-position once more. One reading is too close to the"
-    " margin."
-)
+_ONCE_MORE = "Read the plunger displacement at mid-position once more."
+READ_PLUNGER_AGAIN = f"{_ONCE_MORE} One reading is too close to the margin."
+READ_A_THIRD_TIME = f"{_ONCE_MORE} The two readings differ."
 RESTORE_WORN = "Restore the joints that are over their limits."
 _SET_THAT_HOLDS = (
     "set of joints that can be restored brings the worst case within the margin with"
@@ -227,11 +226,11 @@ def done(unread: int, *, repaired: bool) -> str:
     return " ".join([*said, NOT_A_RELEASE])
 
 
-def read_to_clear(minutes: float, *, repaired: bool) -> str:
+def read_to_clear(minutes: float) -> str:
     """Step READ_PLUNGER of a gear without a complaint."""
     return (
-        f"{_SIGN_OFF if repaired else _NOTHING} To show that the gear is within its margin, read"
-        f" the plunger ({minutes:.0f} min)."
+        f"{_NOTHING} To show that the gear is within its margin, read the plunger"
+        f" ({minutes:.0f} min)."
     )
 
 

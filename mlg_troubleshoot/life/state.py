@@ -703,6 +703,8 @@ class _AsOf:
             return (
                 any(_is_later(repair, e) for e in dated.values())
                 or self._is_closed_by(outcome, repair)
+                # What was typed waits for its sign-off, whatever was read since.
+                or (self._now and repair.visit.typed and not is_open)
                 or not _is_later(own[0] if own else self._visit, repair)
             )
 

@@ -59,7 +59,8 @@ class Visit:
     def todo(self) -> tuple[str, ...]:
         """The columns that NEXT asks for; none where nothing is required."""
         if not self.step.required:
-            return (SIGNED_OFF.name,) * self.row.is_repaired
+            may_sign = self.row.is_repaired and self.step.action is not Action.READ_PLUNGER
+            return (SIGNED_OFF.name,) * may_sign
         if self.step.action in _TO_READ:
             return tuple(map(CLEARANCE.header, self.step.joints))
         asked = _ASKS.get(self.step.action)

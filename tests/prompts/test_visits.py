@@ -146,6 +146,26 @@ def test_what_was_repaired_elsewhere_ends_a_failure_once_the_gear_retracts(sit, 
     assert "repaired selector valve" in log
 
 
+def test_a_repair_without_a_failure_waits_for_its_sign_off_as_well(sit, capsys):
+    sit(*gear("r", "4", "#3 18", "done"), "")
+    sit("N1 LH", "restored 3", "", "", "")
+    for typed in ("p 3", "#3 1"):
+        capsys.readouterr()
+        sit("N1 LH", typed, "")
+        assert "NEXT: Sign the repair off" in next_of(capsys.readouterr().out[-450:])
+    sit("N1 LH", "sign off A. Jones", "")
+    assert next_of(capsys.readouterr().out[-450:]).startswith("NEXT: Nothing is required.")
+
+
+def test_a_gauge_and_a_name_of_another_sitting_are_of_what_is_read_there(sit, begun, life):
+    begun(*failed("8", "11", "done"))
+    sit("N1 LH", "gauge G-07 0.4 thou", "name A. Jones", "#5 9", "")
+    first, last = (visit.inspection for visit in life().visits)
+    assert (first.gauge_id, first.technician_id) == ("G-03", "J. Smith")
+    assert (last.gauge_id, last.technician_id) == ("G-07", "A. Jones")
+    assert last.gauge_u_in == pytest.approx(0.0002)
+
+
 def test_who_measured_what_stands_is_said_where_several_did(sit, begun, now):
     begun(*failed("8", "11", "done"))
     sit("N1 LH", "name A. Jones", "#5 9", "p 40", "")

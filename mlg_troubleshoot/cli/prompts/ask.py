@@ -66,6 +66,7 @@ _HOW = {
 _CONVENTIONS = {kind.lower(): kind.value for kind in ClearanceConvention} | {**CONVENTION.hints}
 # What is typed once for all that follows of a gear.
 _STATED = (*READ_IN, DATE.name)
+_READER = (*LAST, GAUGE_U.name)
 # Questions that Enter leaves open.
 _OPTIONAL = (PLUNGER, *LAST)
 _QUESTIONS = {
@@ -178,8 +179,9 @@ class Asker:
             except UsageError as error:
                 self._refuse(error)
                 continue
-            # The name of who reads on is not that of who read before.
-            stated = {*_STATED} if visit.is_own else {*_STATED, LAST[0]}
+            # Who reads on with which gauge, at another sitting or day, did not read before.
+            goes_on = not visit.is_own or DATE.name in self._stated
+            stated = {*_STATED, *_READER} if goes_on else {*_STATED}
             if word not in ("new", "y") and {*self.entry.typed} <= stated and not self._named:
                 self._state()
             elif self.entry.typed and not (self.entry.has_findings or self._named):
@@ -228,7 +230,8 @@ class Asker:
         """An entry that adds to the records of a gear, or a new inspection of it."""
         cells = {TAIL_NO.name: visit.row.tail_no, SIDE.name: visit.row.side.value}
         if word == "new":
-            self._stated.pop(LAST[0], None)
+            for name in _READER:
+                self._stated.pop(name, None)
             return Entry.new(self.gear, cells | self._stated)
         cells |= self.offered(visit)
         # Nobody is named, and no gauge, that did not read this gear before.
@@ -246,11 +249,11 @@ class Asker:
         return last | self.saved.offered() | self._stated
 
     def _state(self) -> None:
-        """Let unit, convention, day and name of the entry stand for what is typed next for its
-        gear.
+        """Let unit, convention, day, name and gauge of the entry stand for what is typed next for
+        its gear.
         """
         cells = self.entry.cells
-        self._stated |= {name: cells[name] for name in (*_STATED, LAST[0]) if name in cells}
+        self._stated |= {name: cells[name] for name in (*_STATED, *_READER) if name in cells}
 
     def _ask_all(self) -> Entry:
         """Ask what is open, then confirm what is unusual; the entry is complete."""
