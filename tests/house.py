@@ -60,7 +60,7 @@ WAYS = {
 # writes it down again.
 BUDGETS: dict[str, int] = {
     "(top)": 8607,
-    "cli": 26020,
+    "cli": 25995,
     "decision": 28760,
     "diagnosis": 33368,
     "gear": 11149,
@@ -70,13 +70,13 @@ BUDGETS: dict[str, int] = {
     "misfit": 17624,
     "notebook": 1729,
     "paper": 5874,
-    "records": 43574,
+    "records": 43576,
     "reporting": 18184,
     "schemas": 1247,
     "store": 7965,
     "surveying": 4496,
     "wear": 6804,
-    "workflows": 15995,
+    "workflows": 16020,
 }
 _NO_CODE = {
     *(tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT),

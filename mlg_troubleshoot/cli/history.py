@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -167,7 +167,8 @@ def show_gears(
         for line in lines
     ]
     console.print("The most urgent gear first.")
-    _show_warnings(console, (said for line in found.lines for said in line.warnings))
+    for warning in (said for line in found.lines for said in line.warnings):
+        console.print(f"Warning: {warning}")
     spare = ("landings", "last seen", "failed", worst_in, "verdict")
     output.print_table(console, headings, rows, spare, "--json lists all of them", folded=why)
     if joint is not None:
@@ -199,11 +200,6 @@ def _count(landings: float | None) -> str:
     return "-" if landings is None else f"{landings:g}"
 
 
-def _show_warnings(console: output.DataConsole, warnings: Iterable[str]) -> None:
-    for warning in warnings:
-        console.print(output.text(f"Warning: {warning}"))
-
-
 def _show_life(found: LifeAhead, unit: LengthUnit) -> None:
     from mlg_troubleshoot.life.forecast import outlook_sentence
     from mlg_troubleshoot.life.logbook import shortened
@@ -223,7 +219,8 @@ def _show_life(found: LifeAhead, unit: LengthUnit) -> None:
         before = visit
     headings = ("date", "landings>", "hash", "what")
     output.print_table(console, headings, events, ("hash",))
-    _show_warnings(console, life.warnings)
+    for warning in life.warnings:
+        console.print(f"Warning: {warning}")
     for note in life.notes:
         console.print(note)
     if outlook := outlook_sentence(life, found.ahead, found.gear):
@@ -245,34 +242,29 @@ def _show_joints(console: output.DataConsole, found: LifeAhead) -> None:
     )
     rows = []
     for joint in found.joints:
-        if not joint.readings and joint.landings_to_limit is None:
-            continue
-        newest = joint.readings[-3:]
-        read = ", ".join(f"{at:g}: {console.length(clearance)}" for at, clearance in newest)
-        rows.append(
-            (
-                f"#{joint.joint}",
-                console.length(joint.limit_in),
-                span(joint.landings_to_limit, found.gear),
-                ("… " if len(joint.readings) > len(newest) else "") + (read or "none"),
+        read = [f"{at:g}: {console.length(clearance)}" for at, clearance in joint.readings]
+        if read or joint.landings_to_limit is not None:
+            rows.append(
+                (
+                    f"#{joint.joint}",
+                    console.length(joint.limit_in),
+                    span(joint.landings_to_limit, found.gear),
+                    "… " * (len(read) > 3) + (", ".join(read[-3:]) or "none"),
+                )
             )
-        )
     if rows:
         output.print_table(console, headings, rows, ())
     ever = {n for kept in found.life.inspections for n in kept.inspection.clearance_in}
     since = stretches(found.life, found.gear.joint_numbers)
     unread = [n for n, of in since.items() if not of[-1].readings]
+    placeless = [n for n, of in since.items() if of[-1].readings and not of[-1].placed]
     for said, which in (
-        ("Never read", [n for n in unread if n not in ever]),
-        ("Not read since restored", [n for n in unread if n in ever]),
+        ("Never read, counted as 0 above", [n for n in unread if n not in ever]),
+        ("Not read since restored, counted as 0 above", [n for n in unread if n in ever]),
+        ("Read, but without landings (gear_landings), so no forecast", placeless),
     ):
         if which:
-            console.print(f"{said}: {joint_list(which)}; they count as 0 above.")
-    placeless = [n for n, of in since.items() if of[-1].readings and not of[-1].placed]
-    if placeless:
-        console.print(
-            f"Read, but without landings (gear_landings): {joint_list(placeless)}; no forecast."
-        )
+            console.print(f"{said}: {joint_list(which)}.")
 
 
 def _say_added(place: Store, what: str, record: Record) -> None:

@@ -224,7 +224,6 @@ class MeasuredTables:
     def declared(self) -> dict[str, Any]:
         """What a task receives of them."""
         from mlg_troubleshoot.cli.output import say
-        from mlg_troubleshoot.records.values import DateOrder
         from mlg_troubleshoot.workflows.header_file import read_header_file
 
         for name, used in (("MLG_UNIT", self.unit), ("MLG_CONVENTION", self.convention)):
@@ -233,14 +232,7 @@ class MeasuredTables:
         shared: dict[str, str] = {}
         for file in self.map_files:
             shared.update(read_header_file(Path(file)))
-        own = asdict(self)
-        if own.get("dates") is not None:
-            own["dates"] = DateOrder.parse(own["dates"])
-        return {
-            **own,
-            "column_map": self._columns(),
-            "shared_map": shared,
-        }
+        return {**asdict(self), "column_map": self._columns(), "shared_map": shared}
 
     def _columns(self) -> dict[str, str]:
         """What ``--map`` was given, by header."""

@@ -330,9 +330,6 @@ def stages(*, quiet: bool) -> Iterator[Advance]:
         yield advance
 
 
-# Standard input as it is named, and its descriptor. [1]
-_STANDARD_INPUT = "-"
-_DESCRIPTOR = 0
 Outputs = Sequence[tuple[str, str | Path | None]]
 
 
@@ -375,8 +372,9 @@ def _read(name: str | Path | None) -> Sequence[str | Path | int]:
 
     if name is None:
         return ()
-    if str(name) == _STANDARD_INPUT:
-        return [_DESCRIPTOR]
+    if str(name) == "-":
+        # The descriptor of standard input.
+        return [0]
     return [Path(str(file)) for file in expand(str(name))]
 
 
@@ -384,13 +382,9 @@ def _is_gear_file(path: Path) -> bool:
     """Whether a gear file stands there, in use or not."""
     from mlg_troubleshoot.gear.gear_file import load_gear
 
-    if path.suffix != ".toml" or not path.is_file():
-        return False
-    try:
-        load_gear(str(path))
-    except TroubleshootError:
-        return False
-    return True
+    with suppress(TroubleshootError):
+        return path.suffix == ".toml" and path.is_file() and bool(load_gear(str(path)))
+    return False
 
 
 def _reports(folder: Path, others: Iterable[Path]) -> Outputs:

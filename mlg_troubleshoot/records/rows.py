@@ -223,7 +223,7 @@ def visits_of(headings: Sequence[Heading]) -> list[Occasion | None]:
 _WORDS: Mapping[str, Callable[[str], object]] = {
     "unit": LengthUnit.parse,
     "convention": ClearanceConvention.parse,
-    "dates": DateOrder,
+    "dates": DateOrder.parse,
 }
 
 

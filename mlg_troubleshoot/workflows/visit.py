@@ -94,6 +94,7 @@ def find_visit(
     row = state.inspection
     undoes = ""
     is_own = visits[-1].kept.record_id in own
-    if is_own and len(life.visits) > 1:
+    before = [each for each in life.visits if each.kept is not visits[-1].kept]
+    if is_own and state_now(before, gear) is not None:
         undoes = in_words(visits[-1].inspection, gear)
     return Visit(tuple(each.kept for each in visits), row, judge(state), last, is_own, undoes)

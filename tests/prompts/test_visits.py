@@ -136,7 +136,9 @@ def test_what_was_repaired_elsewhere_ends_a_failure_once_the_gear_retracts(sit, 
     """The plunger reads within its margin, and the gear failed: the selector valve leaked."""
     sit(*gear("f", "8", "#1 8 #2 8 #3 8 #4 6 #5 8 #6 7 #7 7 #8 9 #9 7 #10 8"), "")
     assert "Check hydraulics" in capsys.readouterr().out
-    sit("N1 LH", "repaired selector valve", "")
+    screen = sit("N1 LH", "repaired 3", "repaired selector valve on today", "").screen
+    assert "✗ '3' names no part." in screen
+    assert f"✓ other repair selector valve, repair date {date.today()}" in screen
     assert "Read the plunger displacement" in next_of(capsys.readouterr().out[-900:])
     sit("N1 LH", "p 8", "r", "")
     assert "NEXT: Sign the repair off" in capsys.readouterr().out[-900:]
@@ -164,6 +166,13 @@ def test_a_gauge_and_a_name_of_another_sitting_are_of_what_is_read_there(sit, be
     assert (first.gauge_id, first.technician_id) == ("G-03", "J. Smith")
     assert (last.gauge_id, last.technician_id) == ("G-07", "A. Jones")
     assert last.gauge_u_in == pytest.approx(0.0002)
+
+
+def test_a_first_entry_that_began_with_a_repair_is_taken_back_whole(sit, life):
+    typed = gear("restored 3", "f", "46", "#5 9", "done")
+    sit(*typed, "u", "G-04", "", "")
+    repair, found = (visit.inspection for visit in life().visits)
+    assert (repair.restored_joints, found.gauge_id) == ((3,), "G-04")
 
 
 def test_who_measured_what_stands_is_said_where_several_did(sit, begun, now):

@@ -125,4 +125,4 @@ def test_a_joint_without_landings_is_not_called_unread(tmp_path: Path) -> None:
     shown = " ".join(mlg("history", "N123", "LH", "--store", file).out.split())
     assert "Never read" not in shown
     assert "Not read since" not in shown
-    assert "Read, but without landings (gear_landings): #1, #2, #3" in shown
+    assert "Read, but without landings (gear_landings), so no forecast: #1, #2, #3" in shown

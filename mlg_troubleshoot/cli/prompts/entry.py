@@ -79,7 +79,12 @@ _NEXT_JOINT = re.compile(rf"{_NEXT_WORD.pattern}|#", re.IGNORECASE)
 # The day of a part of an entry that has its own.
 _REPAIR = (RESTORED_JOINTS.name, RIGGING_CHECKED.name, OTHER_REPAIR.name)
 _FACTS = (OUTCOME.name, PLUNGER, SIGNED_OFF.name, *_REPAIR)
-DAY_OF = {RESTORED_JOINTS.name: REPAIR_DATE, PLUNGER: "plunger_date", OUTCOME.name: "outcome_date"}
+DAY_OF = {
+    RESTORED_JOINTS.name: REPAIR_DATE,
+    OTHER_REPAIR.name: REPAIR_DATE,
+    PLUNGER: "plunger_date",
+    OUTCOME.name: "outcome_date",
+}
 
 _FOR_DAYS = ReadOptions(unit=LengthUnit.INCH, convention=ClearanceConvention.RADIAL)
 
@@ -279,6 +284,8 @@ class Entry(msgspec.Struct, kw_only=True):
             return Side.parse(typed).value
         if typed.lower() == "none" and name not in HEADING:
             return ""
+        if name == OTHER_REPAIR.name and typed[:1] in "#0123456789":
+            raise UsageError(f"{typed!r} names no part", f"Type restored {typed}, of joints.")
         if not column.is_length:
             if typed:
                 self.judge(gear, name, typed)

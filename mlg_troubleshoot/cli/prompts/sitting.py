@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 # Where the prompts write reports that were not asked for by a flag.
 _REPORTS = Path("report")
+_TAKEN_BACK = "taken back at the prompts"
 
 
 class Sitting:
@@ -153,7 +154,8 @@ class Sitting:
         last = visit.records[-1]
         if not visit.undoes:
             if entry := self._own.get(last.record_id):
-                self._place.add([voids(last, "taken back at the prompts")])
+                whole = [r for r in visit.records if self._own.get(r.record_id) is entry]
+                self._place.add([voids(each, _TAKEN_BACK) for each in whole])
                 return self._asker.again(entry)
             output.say(
                 "u goes no further back than this sitting. Other ways: mlg history amend"
@@ -166,7 +168,7 @@ class Sitting:
             here = self._visit(*key_of(visit.row)) or visit
             self._move(here, [each for each in here.records if each.record_id in ids], key)
         elif not visit.before:
-            self._place.add([voids(last, "taken back at the prompts")])
+            self._place.add([voids(last, _TAKEN_BACK)])
         output.say(f"Undone: {said_in(visit.undoes, self._unit(visit))}.")
         return self._published(*key)
 
