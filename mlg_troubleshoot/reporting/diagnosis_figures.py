@@ -300,7 +300,7 @@ def against_cause(
     setting = candidate.setting
     joints = [setting["joint"]] if "joint" in setting else list(setting.get("pair", ()))
     if joints:
-        least = np.min([axes[CLEARANCE.header(joint)].values for joint in joints], axis=0)
+        least = np.stack([axes[CLEARANCE.header(n)].values for n in joints]).min(axis=0)
         named = " and ".join(f"#{joint}" for joint in joints)
         smaller = "smaller " if len(joints) > 1 else ""
         return ResidualAxis(f"{smaller}clearance of {named}, {unit}", least)
