@@ -71,7 +71,7 @@ BUDGETS: dict[str, int] = {
     "notebook": 1729,
     "paper": 5874,
     "records": 43576,
-    "reporting": 18184,
+    "reporting": 18187,
     "schemas": 1247,
     "store": 7965,
     "surveying": 4496,
