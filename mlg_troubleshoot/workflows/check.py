@@ -464,10 +464,11 @@ def _judge(
     total = len(rows)
     if counting is None:
         counting = _states(rows, found.gear, store, typed=found.read is None)
+    judged = (s.inspection if s else row for row, s in zip(rows, counting, strict=True))
     planned = sum(
-        state.inspection.is_repaired or state.inspection.outcome is Outcome.FAILED
-        for state in counting
-        if state is not None
+        row.is_repaired or row.outcome is Outcome.FAILED
+        for row in judged
+        if isinstance(row, Inspection)
     )
     if total > 1:
         notes = *found.notes, *_warned(rows), *other_visits_count(counting)
@@ -791,7 +792,7 @@ def write_template(
 
 # Gears that failed or were repaired, without and with what follows NEXT: their plans take 20 s on
 # two cores. [1]
-_MOST_PLANNED = (16_000, 6_000)
+_MOST_PLANNED = (16_000, 8_000)
 # Wrong cells that an error names at most.
 _MOST_SAID = 20
 # Rows with warnings that are named. [1]

@@ -222,11 +222,17 @@ def test_reports_of_a_table_that_is_too_long_are_refused_before_it_is_judged(tmp
 @pytest.mark.parametrize(
     ("most", "option", "code"), [((99, 1), "--json", 2), ((99, 1), "--csv", 1)]
 )
+@pytest.mark.parametrize("of_one_row_each", [False, True])
 def test_more_failed_gears_than_there_is_time_to_plan_are_refused(
-    tmp_path, monkeypatch, most, option, code
+    tmp_path, monkeypatch, most, option, code, of_one_row_each
 ):
     monkeypatch.setattr("mlg_troubleshoot.workflows.check._MOST_PLANNED", most)
-    run = mlg("check", FLEET, option, *([tmp_path / "out.csv"] if option == "--csv" else ()))
+    file = FLEET
+    if of_one_row_each:
+        file = tmp_path / "failed.csv"
+        rows = "".join(f"N{n},LH,RADIAL,FAILED,0.004\n" for n in range(3))
+        file.write_text(f"tail_no,side,clearance_convention,outcome,clearance_3_in\n{rows}")
+    run = mlg("check", file, option, *([tmp_path / "out.csv"] if option == "--csv" else ()))
     assert run.code == code
     refused = "at most 1 are planned at once with what follows NEXT; nothing was judged"
     assert (refused in run.err) == (code == 2)
