@@ -464,11 +464,10 @@ def _judge(
     total = len(rows)
     if counting is None:
         counting = _states(rows, found.gear, store, typed=found.read is None)
-    judged = (s.inspection if s else row for row, s in zip(rows, counting, strict=True))
+    known = (state.inspection if state else row for row, state in zip(rows, counting, strict=True))
     planned = sum(
-        row.is_repaired or row.outcome is Outcome.FAILED
-        for row in judged
-        if isinstance(row, Inspection)
+        isinstance(row, Inspection) and (row.is_repaired or row.outcome is Outcome.FAILED)
+        for row in known
     )
     if total > 1:
         notes = *found.notes, *_warned(rows), *other_visits_count(counting)
